@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: Apache-2.0
+/// BSDFs: a closed set, each evaluated for every Scalar.
+///
+/// Conventions: wi points toward the previous vertex (the sensor's side), wo toward the next, both
+/// unit and leaving the surface; n is the unit shading normal. Radiance flows from wo to wi.
+/// `eval` includes |n . wo|. All BSDFs here are isotropic, so the normal is all the frame they need.
+#pragma once
+
+#include <optional>
+#include <variant>
+
+#include "driftlight/fresnel.h"
+#include "driftlight/microfacet.h"
+#include "driftlight/texture.h"
+
+namespace driftlight {
+
+/// Lambert: rho / pi.
+struct Diffuse {
+  Texture reflectance{Rgbd{0.5, 0.5, 0.5}};
+};
+
+/// Smooth metal; eta and k relative to the outside.
+struct Conductor {
+  Rgbd eta{0, 0, 0};
+  Rgbd k{1, 1, 1};
+  Texture specular_reflectance{Rgbd{1, 1, 1}};
+};
+
+/// Rough metal, F D G / (4 cos_i cos_o) with separable Smith G (Walter et al. 2007).
+struct RoughConductor {
+  Microfacets microfacets;
+  Rgbd eta{0, 0, 0};
+  Rgbd k{1, 1, 1};
+  Texture specular_reflectance{Rgbd{1, 1, 1}};
+};
+
+/// Smooth interface; eta is the inner (behind n) over the outer index.
+struct Dielectric {
+  double eta = 1.5046 / 1.000277;
+  Texture specular_reflectance{Rgbd{1, 1, 1}};
+  Texture specular_transmittance{Rgbd{1, 1, 1}};
+};
+
+/// Rough interface (Walter et al. 2007).
+struct RoughDielectric {
+  Microfacets microfacets;
+  double eta = 1.5046 / 1.000277;
+  Texture specular_reflectance{Rgbd{1, 1, 1}};
+  Texture specular_transmittance{Rgbd{1, 1, 1}};
+};
+
+/// Modified Phong: rho_d / pi + rho_s (n + 2) / (2 pi) max(0, wo . mirror(wi))^n
+/// (Lafortune and Willems 1994).
+struct Phong {
+  Texture diffuse_reflectance{Rgbd{0.5, 0.5, 0.5}};
+  Texture specular_reflectance{Rgbd{0.2, 0.2, 0.2}};
+  double exponent = 30;
+};
+
+using Bsdf = std::variant<Diffuse, Conductor, RoughConductor, Dielectric, RoughDielectric, Phong>;
+
+enum class Scattering : unsigned char { Reflection, Transmission };
+
+/// True for smooth mirrors and smooth glass, whose next direction is determined.
+bool is_delta(const Bsdf& bsdf);
+/// True if the BSDF scatters through the surface (and so serves both of its sides).
+bool is_transmissive(const Bsdf& bsdf);
+/// True if every lobe is diffuse.
+bool is_diffuse(const Bsdf& bsdf);
+
+/// A non-negative colour exp(log_scale) * color: the factor with the large range as a logarithm.
+/// color = 0 means no contribution.
+template <Scalar T>
+struct ScaledColor {
+  T log_scale;
+  Rgb<T> color;
+
+  static ScaledColor zero() { return {constant<T>(0.0), constant<T>(Rgbd{0, 0, 0})}; }
+};
+
+/// What a BSDF needs to know of its surface point.
+template <Scalar T>
+struct SurfacePoint {
+  Vec3<T> n;
+  Vec2<T> uv;
+};
+
+/// f_s(wi, wo) |n . wo| of a BSDF that is not delta; zero for delta ones.
+/// Radiance is transported: transmission carries the factor (eta_i / eta_t)^2.
+template <Scalar T>
+ScaledColor<T> eval(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                    const Vec3<T>& wo);
+
+/// Direction that a delta BSDF sends wi into; non-finite for transmission under total reflection.
+template <Scalar T>
+Vec3<T> delta_direction(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                        Scattering scattering);
+
+/// Weight of that direction: R for reflection, (1 - R) (eta_i / eta_t)^2 for transmission.
+template <Scalar T>
+ScaledColor<T> eval_delta(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                          Scattering scattering);
+
+struct BsdfSample {
+  Vec3d wo;
+  Scattering scattering;
+};
+
+/// Draws wo from three numbers in [0, 1). None where the BSDF sends nothing.
+std::optional<BsdfSample> sample(const Bsdf& bsdf, const SurfacePoint<double>& at, const Vec3d& wi,
+                                 const Vec3d& u);
+
+/// Density per solid angle of `sample` (not for delta BSDFs).
+double pdf(const Bsdf& bsdf, const SurfacePoint<double>& at, const Vec3d& wi, const Vec3d& wo);
+
+/// Probability with which `sample` of a delta BSDF takes this kind of scattering.
+double delta_probability(const Bsdf& bsdf, const SurfacePoint<double>& at, const Vec3d& wi,
+                         Scattering scattering);
+
+// ---------------------------------------------------------------------------------------------
+
+namespace detail {
+
+/// F D G / (4 cos_i): |h| of h = wi + wo gives cos(wi, h) = |h| / 2 and cos(n, h) = n.h / |h|.
+template <Scalar T>
+ScaledColor<T> eval_bsdf(const RoughConductor& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                         const Vec3<T>& wo) {
+  using std::log;
+  using std::sqrt;
+  const T cos_i = dot(at.n, wi);
+  const T cos_o = dot(at.n, wo);
+  if (value(cos_i) <= 0.0 || value(cos_o) <= 0.0) return ScaledColor<T>::zero();
+  const T h2 = 2.0 + 2.0 * dot(wi, wo);
+  const T cos_h2 = sqr(cos_i + cos_o) / h2;
+  const Microfacets& m = b.microfacets;
+  const T g = m.g1(cos_i) * m.g1(cos_o);
+  const Rgb<T> fresnel = fresnel_conductor(T(0.5 * sqrt(h2)), b.eta, b.k);
+  return {m.log_d(cos_h2) + log(g / (4.0 * cos_i)),
+          fresnel * b.specular_reflectance.eval(at.uv)};
+}
+
+template <Scalar T>
+ScaledColor<T> eval_bsdf(const Diffuse& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                         const Vec3<T>& wo) {
+  using std::log;
+  const T cos_o = dot(at.n, wo);
+  if (value(dot(at.n, wi)) <= 0.0 || value(cos_o) <= 0.0) return ScaledColor<T>::zero();
+  return {log(cos_o) - std::log(kPi), b.reflectance.eval(at.uv)};
+}
+
+template <Scalar T>
+ScaledColor<T> eval_bsdf(const Conductor&, const SurfacePoint<T>&, const Vec3<T>&,
+                         const Vec3<T>&) {
+  return ScaledColor<T>::zero();
+}
+
+template <Scalar T>
+ScaledColor<T> eval_bsdf(const Dielectric&, const SurfacePoint<T>&, const Vec3<T>&,
+                         const Vec3<T>&) {
+  return ScaledColor<T>::zero();
+}
+
+/// With the (unnormalised) half vector h = wi + e wo, e = 1 for reflection and the index beyond over
+/// the index on the side of wi for transmission:
+///   reflection    F D G / (4 |cos_i|)
+///   transmission  (1 - F) D G |wi.h wo.h| / (|cos_i| (wi.h + e wo.h)^2)
+/// per unit half vector; e^2 of Walter et al. and the 1 / e^2 of radiance cancel, and so do the
+/// lengths of h.
+template <Scalar T>
+ScaledColor<T> eval_bsdf(const RoughDielectric& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                         const Vec3<T>& wo) {
+  using std::abs;
+  using std::log;
+  using std::sqrt;
+  const T cos_i = dot(at.n, wi);
+  const T cos_o = dot(at.n, wo);
+  if (value(cos_i) == 0.0 || value(cos_o) == 0.0) return ScaledColor<T>::zero();
+  const bool reflection = (value(cos_i) > 0.0) == (value(cos_o) > 0.0);
+  const double eta = value(cos_i) > 0.0 ? b.eta : 1.0 / b.eta;
+  const double e = reflection ? 1.0 : eta;
+  const T io = dot(wi, wo);
+  const T h2 = (1.0 + e * e) + (2.0 * e) * io;
+  const T ih = 1.0 + e * io;
+  const T oh = io + e;
+  const T cos_h2 = sqr(cos_i + e * cos_o) / h2;
+  // A facet must be seen from the side on which the macroscopic surface is.
+  const double h_side = value(cos_i) + e * value(cos_o);
+  if (value(ih) * h_side * value(cos_i) <= 0.0 || value(oh) * h_side * value(cos_o) <= 0.0)
+    return ScaledColor<T>::zero();
+  const Microfacets& m = b.microfacets;
+  const T g = m.g1(cos_i) * m.g1(cos_o);
+  const T fresnel = fresnel_dielectric(T(abs(ih) / sqrt(h2)), eta);
+  const T log_dg = m.log_d(cos_h2) + log(g / abs(cos_i));
+  if (reflection) {
+    return {log_dg + log(0.25 * fresnel), b.specular_reflectance.eval(at.uv)};
+  }
+  if (value(fresnel) >= 1.0) return ScaledColor<T>::zero();
+  return {log_dg + log((1.0 - fresnel) * abs(ih * oh) / sqr(ih + e * oh)),
+          b.specular_transmittance.eval(at.uv)};
+}
+
+/// (n + 2) / (2 pi) max(0, wo . mirror)^n
+template <Scalar T>
+T phong_lobe(const Phong& b, const T& cos_mirror) {
+  using std::exp;
+  using std::log;
+  if (value(cos_mirror) <= 0.0) return constant<T>(0.0);
+  return (b.exponent + 2.0) * (0.5 * kInvPi) * exp(b.exponent * log(cos_mirror));
+}
+
+template <Scalar T>
+ScaledColor<T> eval_bsdf(const Phong& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                         const Vec3<T>& wo) {
+  using std::log;
+  const T cos_o = dot(at.n, wo);
+  if (value(dot(at.n, wi)) <= 0.0 || value(cos_o) <= 0.0) return ScaledColor<T>::zero();
+  const T lobe = phong_lobe(b, dot(wo, reflect(wi, at.n)));
+  const Rgb<T> diffuse = b.diffuse_reflectance.eval(at.uv);
+  const Rgb<T> specular = b.specular_reflectance.eval(at.uv);
+  Rgb<T> color;
+  for (int c = 0; c < 3; ++c) color[c] = diffuse[c] * kInvPi + specular[c] * lobe;
+  return {log(cos_o), color};
+}
+
+}  // namespace detail
+
+template <Scalar T>
+ScaledColor<T> eval(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                    const Vec3<T>& wo) {
+  return std::visit([&](const auto& b) { return detail::eval_bsdf(b, at, wi, wo); }, bsdf);
+}
+
+template <Scalar T>
+Vec3<T> delta_direction(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                        Scattering scattering) {
+  if (scattering == Scattering::Reflection) return reflect(wi, at.n);
+  const double eta = std::get<Dielectric>(bsdf).eta;
+  return refract(wi, at.n, value(dot(at.n, wi)) > 0.0 ? eta : 1.0 / eta);
+}
+
+template <Scalar T>
+ScaledColor<T> eval_delta(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                          Scattering scattering) {
+  using std::abs;
+  using std::log;
+  const T cos_i = dot(at.n, wi);
+  if (const auto* metal = std::get_if<Conductor>(&bsdf)) {
+    if (value(cos_i) <= 0.0) return ScaledColor<T>::zero();
+    return {constant<T>(0.0), fresnel_conductor(cos_i, metal->eta, metal->k) *
+                                  metal->specular_reflectance.eval(at.uv)};
+  }
+  const auto& glass = std::get<Dielectric>(bsdf);
+  const double eta = value(cos_i) > 0.0 ? glass.eta : 1.0 / glass.eta;
+  const T fresnel = fresnel_dielectric(T(abs(cos_i)), eta);
+  if (scattering == Scattering::Reflection)
+    return {log(fresnel), glass.specular_reflectance.eval(at.uv)};
+  if (value(fresnel) >= 1.0) return ScaledColor<T>::zero();
+  return {log(1.0 - fresnel) - 2.0 * std::log(eta), glass.specular_transmittance.eval(at.uv)};
+}
+
+}  // namespace driftlight

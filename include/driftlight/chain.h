@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+/// A Metropolis-Hastings chain over light paths: large steps and Langevin steps.
+#pragma once
+
+#include <limits>
+#include <optional>
+
+#include "driftlight/contribution.h"
+#include "driftlight/film.h"
+#include "driftlight/gradient.h"
+#include "driftlight/kernel.h"
+#include "driftlight/path_sampler.h"
+#include "driftlight/render.h"
+
+namespace driftlight {
+
+/// Mean and variance of independent numbers.
+struct RunningMean {
+  std::uint64_t count = 0;
+  double sum = 0;
+  double sum_of_squares = 0;
+
+  void add(double x) {
+    ++count;
+    sum += x;
+    sum_of_squares += x * x;
+  }
+  RunningMean& operator+=(const RunningMean& other);
+  double mean() const { return count > 0 ? sum / static_cast<double>(count) : 0; }
+  /// Standard error of the mean.
+  double error() const;
+};
+
+/// A path with all that the kernels know of it.
+struct ChainState {
+  PathTopology topology;
+  PathCoordinates coordinates;
+  Contribution contribution;
+  Chart chart;
+  StepDistribution step;
+  bool has_step = false;   ///< chart and step are computed
+  /// log (f / q), the weight of a large step; NaN until it is needed.
+  double log_weight = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// log of the acceptance probability min(1, pi(y) p(x|y) / (pi(x) p(y|x))) (E63.6); -infinity if
+/// anything is NaN.
+double log_acceptance(double log_target_from, double log_target_to, double log_pdf_forward,
+                      double log_pdf_reverse);
+
+/// Chart and step distribution of a state, by the kernel's options.
+void prepare_step(const Scene& scene, const KernelOptions& options, ChainState& state);
+
+class Chain {
+ public:
+  /// Starts at a path that carries light.
+  Chain(const Scene& scene, const PathSampler& sampler, const LangevinOptions& options, Film& film,
+        const PathSampler::Sample& start, Rng rng);
+
+  /// Runs mutations, each splatting both states with weights 1 - a and a.
+  void run(std::uint64_t mutations);
+  /// Deposits what the current state has gathered since it was entered.
+  void flush();
+
+  const LangevinStatistics& statistics() const { return statistics_; }
+  /// Weights f / q of all large steps proposed so far: independent estimates of b.
+  const RunningMean& weights() const { return weights_; }
+  const ChainState& state() const { return states_[current_]; }
+
+ private:
+  ChainState& current() { return states_[current_]; }
+  ChainState& proposed() { return states_[1 - current_]; }
+  /// Each returns the acceptance probability; none if there is no valid proposal.
+  std::optional<double> propose_large();
+  std::optional<double> propose_small();
+  /// Traces and evaluates proposed(); counts why it fails.
+  bool evaluate_proposed();
+  /// Moves with this probability; true if it moved.
+  bool resolve(double acceptance);
+
+  const Scene& scene_;
+  const PathSampler& sampler_;
+  const LangevinOptions& options_;
+  Film& film_;
+  Rng rng_;
+  ChainState states_[2];
+  std::size_t current_ = 0;
+  double gathered_ = 0;  ///< weight of the current state not yet splatted
+  LangevinStatistics statistics_;
+  RunningMean weights_;
+};
+
+}  // namespace driftlight

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The constraints a path lives under (DESIGN 1.5), as residuals with their precision.
+///
+/// Every mechanism that makes the contribution vanish quickly is a residual r(X) of a few numbers
+/// with a precision w = 1 / sigma^2; together they make
+///   Q = 1/9 sum_k w_k J_k^T J_k + pi^-2 I,   J_k = d r_k / d delta                    (E63.13)
+/// where q_k = 3 sigma_k is the "almost never exceeded" bound of [E63]. Precisions are taken at X,
+/// not differentiated: they have the type of the scalar with one level of Jets stripped.
+#pragma once
+
+#include "driftlight/walk.h"
+
+namespace driftlight {
+
+/// Sink: void add(const T& residual, const Stripped<T>& precision).
+template <Scalar T, class Sink>
+class ConstraintVisitor : public WalkVisitor<T> {
+ public:
+  using S = Stripped<T>;
+
+  explicit ConstraintVisitor(Sink& sink) : sink_(sink) {}
+
+  /// Film position: uniform on the film, half side / sqrt(3); 1 / sqrt(12) in film coordinates.
+  void sensor(const PerspectiveCamera& camera, const Vec3<T>& v) {
+    const Vec2<T> film = camera.film_position(v);
+    const S precision = constant<S>(12.0);
+    sink_.add(film.x(), precision);
+    sink_.add(film.y(), precision);
+  }
+
+  /// Small object and small emitter: the position in the shape's principal axes against the
+  /// covariance of the uniform distribution on the shape.
+  void position(const Shape& shape, const Vec3<T>& p) {
+    const S one = constant<S>(1.0);
+    for (int i = 0; i < 3; ++i) {
+      const Vec3d row = shape.extent.whitening.row(i);
+      if (!row.isZero(0.0)) sink_.add(dot(row, p), one);
+    }
+  }
+
+  void scatter(const ScatterEvent<T>& e) {
+    std::visit([&](const auto& bsdf) { constrain(bsdf, e); }, e.bsdf);
+  }
+  void connect(const ScatterEvent<T>& e) { scatter(e); }
+
+  /// Environment map: the direction, of width 1 / |grad log L| between a texel and 1 radian.
+  void environment(const Emitter& emitter, const Vec3<T>& v) {
+    const auto* map = std::get_if<EnvironmentMap>(&emitter);
+    if (map == nullptr) return;
+    add(v, environment_precision(*map, stripped(v)));
+  }
+
+ private:
+  static Vec3<S> stripped(const Vec3<T>& v) { return {strip(v.x()), strip(v.y()), strip(v.z())}; }
+
+  void add(const Vec3<T>& residual, const S& precision) {
+    for (int i = 0; i < 3; ++i) sink_.add(residual[i], precision);
+  }
+
+  /// Slopes of the half vector as a vector of the tangent plane, r = h / (h.n) - n, |r| = tan(h, n):
+  /// free of any choice of tangents. h = wi + e wo need not be normalised.
+  Vec3<T> slopes(const ScatterEvent<T>& e, double eta) const {
+    const Vec3<T>& n = e.at.n_s;
+    const Vec3<T> h = {e.wi.x() + e.wo.x() * eta, e.wi.y() + e.wo.y() * eta,
+                       e.wi.z() + e.wo.z() * eta};
+    const T inverse = constant<T>(1.0) / dot(h, n);
+    return {h.x() * inverse - n.x(), h.y() * inverse - n.y(), h.z() * inverse - n.z()};
+  }
+
+  /// sigma^2 of Microfacets::slope_variance.
+  void add_slopes(const Microfacets& microfacets, const Vec3<T>& r, const S& responsibility) {
+    const Vec3<S> s = stripped(r);
+    add(r, responsibility / microfacets.slope_variance(dot(s, s)));
+  }
+
+  /// Tangential part of wo; U = -log cos has sigma = cos.
+  void add_diffuse(const ScatterEvent<T>& e, const S& responsibility) {
+    const T cosine = dot(e.at.n_s, e.wo);
+    const Vec3<T> minus_cosine = scaled(e.at.n_s, T(-cosine));
+    const S sigma = strip(cosine);
+    add(e.wo + minus_cosine, responsibility / (sigma * sigma));
+  }
+
+  void constrain(const Diffuse&, const ScatterEvent<T>& e) { add_diffuse(e, constant<S>(1.0)); }
+  void constrain(const Conductor&, const ScatterEvent<T>&) {}
+  void constrain(const Dielectric&, const ScatterEvent<T>&) {}
+  void constrain(const RoughConductor& b, const ScatterEvent<T>& e) {
+    add_slopes(b.microfacets, slopes(e, 1.0), constant<S>(1.0));
+  }
+  void constrain(const RoughDielectric& b, const ScatterEvent<T>& e) {
+    const bool outside = value(dot(e.at.n_s, e.wi)) > 0.0;
+    const double eta = e.scattering == Scattering::Reflection ? 1.0 : outside ? b.eta : 1.0 / b.eta;
+    add_slopes(b.microfacets, slopes(e, eta), constant<S>(1.0));
+  }
+
+  /// Two lobes, each weighted by its share of f at X. The glossy one constrains wo to the mirror
+  /// direction with sigma = 1 / sqrt(n).
+  void constrain(const Phong& b, const ScatterEvent<T>& e) {
+    const Vec3<T> mirror = reflect(e.wi, e.at.n_s);
+    const Vec2<S> uv{strip(e.at.uv.x()), strip(e.at.uv.y())};
+    const S lobe = detail::phong_lobe(b, S(strip(dot(e.wo, mirror))));
+    const S specular = luminance(b.specular_reflectance.eval(uv)) * lobe;
+    const S diffuse = luminance(b.diffuse_reflectance.eval(uv)) * kInvPi;
+    if (!(value(specular) + value(diffuse) > 0.0)) return;
+    const S share = specular / (specular + diffuse);
+    if (value(share) > 0.0) add(e.wo - mirror, share * b.exponent);
+    if (value(share) < 1.0) add_diffuse(e, 1.0 - share);
+  }
+
+  /// |grad log L|^2 from the map's exact slopes along two tangents.
+  static S environment_precision(const EnvironmentMap& map, const Vec3<S>& v) {
+    using J = ceres::Jet<S, 2>;
+    const TangentBasis basis = tangent_basis(value(v));
+    Vec3<J> seeded;
+    for (int i = 0; i < 3; ++i) {
+      seeded[i] = J(v[i]);
+      seeded[i].v[0] = constant<S>(basis.t[i]);
+      seeded[i].v[1] = constant<S>(basis.b[i]);
+    }
+    const J radiance = luminance(map.eval(seeded));
+    const double texel = map.texel_angle();
+    const S l2 = radiance.a * radiance.a;
+    const S slope2 = radiance.v[0] * radiance.v[0] + radiance.v[1] * radiance.v[1];
+    // Clamped, and constant beyond the clamp: a width, not a force, so the kink does no harm.
+    if (!(value(slope2) > value(l2))) return constant<S>(1.0);
+    if (value(slope2) * texel * texel > value(l2)) return constant<S>(1.0 / (texel * texel));
+    return slope2 / l2;
+  }
+
+  Sink& sink_;
+};
+
+}  // namespace driftlight

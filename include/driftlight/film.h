@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The film: splats in fixed point, so that their sum does not depend on their order.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+#include "driftlight/image.h"
+#include "driftlight/scalar.h"
+
+namespace driftlight {
+
+/// Box filter of one pixel. Splats are colours of luminance `weight` <= 1 (see Contribution::color),
+/// so that a component is at most 14 and 2^28 splats fit a pixel.
+class Film {
+ public:
+  Film(int width, int height);
+
+  /// Adds weight * color at film coordinates in [0, 1)^2. Any thread may call it.
+  void splat(const Vec2d& film, const Rgbd& color, double weight);
+
+  /// The sums, times `scale`.
+  Image develop(double scale) const;
+
+ private:
+  static constexpr double kUnit = 0x1p31;
+
+  int width_;
+  int height_;
+  std::vector<std::atomic<std::int64_t>> sums_;
+};
+
+}  // namespace driftlight

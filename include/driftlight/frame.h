@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Directions and small vector geometry, for every Scalar.
+#pragma once
+
+#include <array>
+#include <cmath>
+
+#include "driftlight/scalar.h"
+
+namespace driftlight {
+
+template <Scalar T>
+struct Ray {
+  Vec3<T> origin;
+  Vec3<T> direction;  ///< unit length
+};
+
+/// a . b, written out: one expression for all scalars and no temporaries of Jets.
+template <Scalar T>
+T dot(const Vec3<T>& a, const Vec3<T>& b) {
+  return a.x() * b.x() + a.y() * b.y() + a.z() * b.z();
+}
+template <Scalar T>
+  requires(ScalarTraits<T>::is_jet)
+T dot(const Vec3d& a, const Vec3<T>& b) {
+  return a.x() * b.x() + a.y() * b.y() + a.z() * b.z();
+}
+
+/// p + v t
+template <Scalar T>
+Vec3<T> along(const Vec3<T>& p, const T& t, const Vec3<T>& v) {
+  return {p.x() + t * v.x(), p.y() + t * v.y(), p.z() + t * v.z()};
+}
+
+template <Scalar T>
+Vec3<T> scaled(const Vec3<T>& v, const T& s) {
+  return {v.x() * s, v.y() * s, v.z() * s};
+}
+
+template <Scalar T>
+Vec3<T> normalized(const Vec3<T>& v) {
+  using std::sqrt;
+  return scaled(v, constant<T>(1.0) / sqrt(dot(v, v)));
+}
+
+/// Mirror direction of w about the unit normal n, both leaving the surface: 2 (n.w) n - w.
+template <Scalar T>
+Vec3<T> reflect(const Vec3<T>& w, const Vec3<T>& n) {
+  const T k = 2.0 * dot(n, w);
+  return {k * n.x() - w.x(), k * n.y() - w.y(), k * n.z() - w.z()};
+}
+
+/// Direction of w refracted at the unit normal n; both w and the result leave the surface.
+/// `eta` is the index beyond the surface over the index on the side of w (n may lie on either
+/// side). With c = n.w and s = sign(c): wo = -w / eta + (c / eta - s sqrt(1 - (1 - c^2) / eta^2)) n.
+/// Total internal reflection gives a non-finite result: callers ask fresnel first.
+template <Scalar T>
+Vec3<T> refract(const Vec3<T>& w, const Vec3<T>& n, double eta) {
+  using std::sqrt;
+  const double inv = 1.0 / eta;
+  const T c = dot(n, w);
+  const T root = sqrt(1.0 - (1.0 - c * c) * (inv * inv));
+  const T k = value(c) > 0 ? c * inv - root : c * inv + root;
+  return {k * n.x() - w.x() * inv, k * n.y() - w.y() * inv, k * n.z() - w.z() * inv};
+}
+
+/// Columns t, b completing the unit vector n to a right-handed orthonormal basis (t, b, n).
+/// Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1), 2017.
+struct TangentBasis {
+  Vec3d t;
+  Vec3d b;
+};
+
+inline TangentBasis tangent_basis(const Vec3d& n) {
+  const double sign = std::copysign(1.0, n.z());
+  const double a = -1.0 / (sign + n.z());
+  const double k = n.x() * n.y() * a;
+  return {{1.0 + sign * n.x() * n.x() * a, sign * k, -sign * n.x()},
+          {k, sign + n.y() * n.y() * a, -n.y()}};
+}
+
+/// The direction with coordinates `local` in (t, b, n).
+inline Vec3d to_world(const Vec3d& local, const Vec3d& n) {
+  const TangentBasis basis = tangent_basis(n);
+  return basis.t * local.x() + basis.b * local.y() + n * local.z();
+}
+inline Vec3d to_local(const Vec3d& world, const Vec3d& n) {
+  const TangentBasis basis = tangent_basis(n);
+  return {basis.t.dot(world), basis.b.dot(world), n.dot(world)};
+}
+
+}  // namespace driftlight

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Shapes, and where rays meet them.
+///
+/// A hit is found once, with Embree, and is opaque; the interaction is computed from it for every
+/// Scalar, so that derivatives see the exact geometry of the primitive that was hit.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <variant>
+#include <vector>
+
+#include "driftlight/frame.h"
+
+namespace driftlight {
+
+/// World-space triangles, counter-clockwise about the outer side. `normals` and `uvs` are empty or
+/// as long as `positions`. With normals, they are interpolated for shading, and the geometric normal
+/// takes their side. Without uvs, texture coordinates are the barycentric ones.
+struct TriangleMesh {
+  std::vector<Eigen::Vector3f> positions;
+  std::vector<Eigen::Vector3f> normals;
+  std::vector<Eigen::Vector2f> uvs;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+/// uv = (phi / (2 pi), theta / pi) in the sphere's own frame, whose axes are the rows of `to_local`.
+/// A hit's primitive is the root of the quadratic: 0 where the ray enters, 1 where it leaves.
+struct Sphere {
+  Vec3d center{0, 0, 0};
+  double radius = 1;
+  Eigen::Matrix3d to_local = Eigen::Matrix3d::Identity();
+  bool flip_normals = false;
+};
+
+/// The ellipse { center + s u + t v : s^2 + t^2 <= 1 } with normal along u x v.
+/// uv = (r, phi / (2 pi)) in (s, t).
+struct Disk {
+  Vec3d center{0, 0, 0};
+  Vec3d u{1, 0, 0};
+  Vec3d v{0, 1, 0};
+};
+
+using Geometry = std::variant<TriangleMesh, Sphere, Disk>;
+
+/// Names a primitive of a shape of the scene.
+struct Hit {
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+
+  std::uint32_t shape = kNone;
+  std::uint32_t primitive = 0;
+
+  bool valid() const { return shape != kNone; }
+  bool operator==(const Hit&) const = default;
+};
+
+/// A point on a surface, in world space.
+template <Scalar T>
+struct Interaction {
+  Vec3<T> p;
+  Vec3<T> n_g;  ///< unit geometric normal, on the side of n_s
+  Vec3<T> n_s;  ///< unit shading normal
+  Vec2<T> uv;   ///< texture coordinates; zero if not asked for
+};
+
+/// Corners of a triangle, in double.
+inline std::array<Vec3d, 3> corners(const TriangleMesh& mesh, std::uint32_t triangle) {
+  const auto& t = mesh.triangles[triangle];
+  return {mesh.positions[t[0]].cast<double>(), mesh.positions[t[1]].cast<double>(),
+          mesh.positions[t[2]].cast<double>()};
+}
+
+/// Unit geometric normal of a triangle, on the side of its vertex normals.
+inline Vec3d geometric_normal(const TriangleMesh& mesh, std::uint32_t triangle) {
+  const std::array<Vec3d, 3> p = corners(mesh, triangle);
+  const Vec3d n = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
+  if (mesh.normals.empty()) return n;
+  Vec3d shading = Vec3d::Zero();
+  for (const std::uint32_t i : mesh.triangles[triangle]) shading += mesh.normals[i].cast<double>();
+  return n.dot(shading) < 0.0 ? Vec3d(-n) : n;
+}
+
+namespace detail {
+
+/// t = n.(p0 - o) / n.d meets the triangle's plane; barycentric b1, b2 by Cramer's rule:
+/// b1 = n.((p - p0) x e2) / |n|^2,  b2 = n.(e1 x (p - p0)) / |n|^2  with n = e1 x e2.
+template <Scalar T>
+Interaction<T> interact_shape(const TriangleMesh& mesh, std::uint32_t primitive, const Ray<T>& ray,
+                              bool want_uv) {
+  const auto& index = mesh.triangles[primitive];
+  const std::array<Vec3d, 3> corner = corners(mesh, primitive);
+  const Vec3d e1 = corner[1] - corner[0];
+  const Vec3d e2 = corner[2] - corner[0];
+  const Vec3d n = e1.cross(e2);
+  const T t = (n.dot(corner[0]) - dot(n, ray.origin)) / dot(n, ray.direction);
+  Interaction<T> at;
+  at.p = along(ray.origin, t, ray.direction);
+  const double n2 = n.squaredNorm();
+  const Vec3d unit = n / std::sqrt(n2);
+  at.n_g = constant<T>(unit);
+  at.n_s = at.n_g;
+  at.uv = constant<T>(Vec2d(0, 0));
+  if (mesh.normals.empty() && !want_uv) return at;
+
+  const Vec3d c1 = e2.cross(n) / n2;
+  const Vec3d c2 = n.cross(e1) / n2;
+  const T b1 = dot(c1, at.p) - c1.dot(corner[0]);
+  const T b2 = dot(c2, at.p) - c2.dot(corner[0]);
+  if (!mesh.normals.empty()) {
+    const Vec3d n0 = mesh.normals[index[0]].cast<double>();
+    const Vec3d n1 = mesh.normals[index[1]].cast<double>() - n0;
+    const Vec3d n2_ = mesh.normals[index[2]].cast<double>() - n0;
+    at.n_s = normalized(Vec3<T>{b1 * n1.x() + b2 * n2_.x() + n0.x(),
+                                b1 * n1.y() + b2 * n2_.y() + n0.y(),
+                                b1 * n1.z() + b2 * n2_.z() + n0.z()});
+    if (unit.dot(value(at.n_s)) < 0.0) at.n_g = constant<T>(Vec3d(-unit));
+  }
+  if (want_uv) {
+    if (mesh.uvs.empty()) {
+      at.uv = {b1, b2};
+    } else {
+      const Vec2d u0 = mesh.uvs[index[0]].cast<double>();
+      const Vec2d u1 = mesh.uvs[index[1]].cast<double>() - u0;
+      const Vec2d u2 = mesh.uvs[index[2]].cast<double>() - u0;
+      at.uv = {b1 * u1.x() + b2 * u2.x() + u0.x(), b1 * u1.y() + b2 * u2.y() + u0.y()};
+    }
+  }
+  return at;
+}
+
+/// |o + t d - c|^2 = r^2:  t = -b -+ sqrt(b^2 - (|o - c|^2 - r^2)),  b = (o - c).d
+template <Scalar T>
+Interaction<T> interact_shape(const Sphere& sphere, std::uint32_t primitive, const Ray<T>& ray,
+                              bool want_uv) {
+  using std::acos;
+  using std::atan2;
+  using std::sqrt;
+  const Vec3<T> oc = {ray.origin.x() - sphere.center.x(), ray.origin.y() - sphere.center.y(),
+                      ray.origin.z() - sphere.center.z()};
+  const T b = dot(oc, ray.direction);
+  const T root = sqrt(b * b - (dot(oc, oc) - sphere.radius * sphere.radius));
+  const T t = primitive == 0 ? T(-b - root) : T(root - b);
+  const Vec3<T> n = normalized(along(oc, t, ray.direction));
+  Interaction<T> at;
+  const T radius = constant<T>(sphere.radius);
+  at.p = along(constant<T>(sphere.center), radius, n);
+  at.n_g = sphere.flip_normals ? Vec3<T>(-n) : n;
+  at.n_s = at.n_g;
+  at.uv = constant<T>(Vec2d(0, 0));
+  if (want_uv) {
+    const Vec3d x = sphere.to_local.row(0);
+    const Vec3d y = sphere.to_local.row(1);
+    const Vec3d z = sphere.to_local.row(2);
+    const T phi = atan2(dot(y, n), dot(x, n)) * (0.5 * kInvPi);
+    at.uv = {value(phi) < 0.0 ? T(phi + 1.0) : phi, acos(dot(z, n)) * kInvPi};
+  }
+  return at;
+}
+
+template <Scalar T>
+Interaction<T> interact_shape(const Disk& disk, std::uint32_t /*primitive*/, const Ray<T>& ray,
+                              bool want_uv) {
+  using std::atan2;
+  using std::sqrt;
+  const Vec3d n = disk.u.cross(disk.v);
+  const T t = (n.dot(disk.center) - dot(n, ray.origin)) / dot(n, ray.direction);
+  Interaction<T> at;
+  at.p = along(ray.origin, t, ray.direction);
+  at.n_g = constant<T>(Vec3d(n.normalized()));
+  at.n_s = at.n_g;
+  at.uv = constant<T>(Vec2d(0, 0));
+  if (want_uv) {
+    const Vec3d cu = disk.v.cross(n) / n.squaredNorm();
+    const Vec3d cv = n.cross(disk.u) / n.squaredNorm();
+    const T s = dot(cu, at.p) - cu.dot(disk.center);
+    const T q = dot(cv, at.p) - cv.dot(disk.center);
+    const T phi = atan2(q, s) * (0.5 * kInvPi);
+    at.uv = {sqrt(s * s + q * q), value(phi) < 0.0 ? T(phi + 1.0) : phi};
+  }
+  return at;
+}
+
+}  // namespace detail
+
+/// The point where the ray meets the primitive, whose surface is extended beyond its edges (planes
+/// are not bounded). Non-finite if there is no such point.
+template <Scalar T>
+Interaction<T> interact(const Geometry& geometry, std::uint32_t primitive, const Ray<T>& ray,
+                        bool want_uv) {
+  return std::visit(
+      [&](const auto& shape) { return detail::interact_shape(shape, primitive, ray, want_uv); },
+      geometry);
+}
+
+}  // namespace driftlight

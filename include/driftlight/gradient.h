@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Exact derivatives of a path: gradient of the potential, constraint matrix Q, divergence of Q^-1.
+#pragma once
+
+#include "driftlight/phase_space.h"
+
+namespace driftlight {
+
+/// What to differentiate. Nothing that is not asked for is computed.
+struct DerivativeRequest {
+  bool gradient = true;
+  bool constraints = true;
+};
+
+struct PathDerivatives {
+  /// grad U = -grad log target, over the tangent coordinates of the chart. (d)
+  Vector gradient;
+  /// Q of (E63.13) with its floor, symmetric positive definite; the lower triangle is set. (d x d)
+  Matrix q;
+
+  /// True if all that was computed is finite.
+  bool all_finite(const DerivativeRequest& request) const;
+};
+
+/// Derivatives at the chart's base point, by ceres::Jet in one pass (or in passes of 16 coordinates
+/// for longer paths).
+void differentiate(const Scene& scene, const PathTopology& topology, const Chart& chart,
+                   const DerivativeRequest& request, PathDerivatives& result);
+
+/// Q at the tangent coordinates `delta` of the same chart, with Jacobians over those coordinates.
+void constraint_matrix(const Scene& scene, const PathTopology& topology, const Chart& chart,
+                       const Vector& delta, Matrix& q);
+
+/// div(Q^-1)_i = sum_j d(Q^-1)_ij / d delta_j at the chart's base point, given Q^-1 there:
+/// dQ^-1 = -Q^-1 dQ Q^-1 with dQ by central differences in the chart, 2 d evaluations of Q.
+/// Non-finite where a displaced path does not exist.
+Vector divergence(const Scene& scene, const PathTopology& topology, const Chart& chart,
+                  const Matrix& q_inverse);
+
+/// Floor that keeps Q positive definite: pi^-2 on the diagonal (DESIGN 1.5).
+inline constexpr double kConstraintFloor = kInvPi * kInvPi;
+
+}  // namespace driftlight

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Options of the integrators, with their text form for command lines.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "driftlight/path.h"
+
+namespace driftlight {
+
+/// What the drift a of (E63.3) keeps.
+enum class Drift {
+  None,      ///< Brownian steps only (E63.7)
+  Gradient,  ///< - T T* grad U
+  Full,      ///< - T T* grad U + div(T T*)
+};
+
+enum class PreconditionerKind {
+  Identity,     ///< the same step in every direction
+  Constraints,  ///< Q of the path's constraints (E63.13)
+};
+
+/// A small step of the Langevin kernel (E63.3, 8, 9).
+struct KernelOptions {
+  Drift drift = Drift::Gradient;
+  PreconditionerKind preconditioner = PreconditionerKind::Constraints;
+  /// Of (E63.8): dt |(a, grad U)| <= epsilon.
+  double epsilon = 0.1;
+  /// dt is divided by it.
+  double safety = 1;
+  /// Upper bound of dt; 1/3 is that of (E63.9).
+  double time_step_cap = 1.0 / 3.0;
+  /// Factor on T. With the identity preconditioner it is the standard deviation of a step, in
+  /// radians, at dt = 1/3.
+  double scale = 1;
+  /// If positive, each step draws its scale log-uniformly over this many decades about `scale`.
+  double scale_decades = 0;
+};
+
+/// The Langevin sampler of [E63].
+struct LangevinOptions {
+  KernelOptions kernel;
+  double large_step_probability = 0.1;
+  /// Independent chains, whatever the number of threads.
+  int chains = 128;
+  /// Samples that estimate the normalization b and start the chains.
+  int bootstrap = 100000;
+  /// Longest path, in edges.
+  int max_depth = 12;
+
+  /// Throws OptionError.
+  void validate() const;
+};
+
+/// The path tracer.
+struct PathOptions {
+  int max_depth = 12;
+
+  /// Throws OptionError.
+  void validate() const;
+};
+
+/// One option by name, bound to a field.
+struct OptionEntry {
+  std::string_view name;
+  std::string values;         ///< what it accepts
+  std::string_view help;
+  std::function<std::string()> get;
+  std::function<void(const std::string&)> set;  ///< throws OptionError
+};
+
+/// The options of an integrator, in the order in which they are listed.
+std::vector<OptionEntry> entries(LangevinOptions& options);
+std::vector<OptionEntry> entries(PathOptions& options);
+
+/// Sets `name` to `value`. Throws OptionError naming the option and the valid ones or values.
+void set_option(const std::vector<OptionEntry>& entries, const std::string& name,
+                const std::string& value);
+
+}  // namespace driftlight

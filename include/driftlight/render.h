@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Rendering: an integrator runs over a scene and returns an image.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <optional>
+
+#include "driftlight/image.h"
+#include "driftlight/options.h"
+#include "driftlight/scene.h"
+
+namespace driftlight {
+
+struct Progress {
+  double fraction = 0;  ///< of the work or of the time, in [0, 1]
+  double elapsed = 0;   ///< seconds
+};
+
+/// What every integrator needs to be told.
+struct RenderOptions {
+  /// Threads of the machine; 0: all. The image does not depend on it.
+  int threads = 0;
+  std::uint64_t seed = 0;
+  /// Seconds to render; the image then depends on the machine's speed. None: by work.
+  std::optional<double> time;
+  /// Called now and then, from one thread at a time.
+  std::function<void(const Progress&)> progress;
+  /// When it turns true the render ends early and returns what it has.
+  const std::atomic<bool>* stop = nullptr;
+};
+
+/// Why proposals of the small step were rejected.
+struct Rejections {
+  std::uint64_t missed = 0;
+  std::uint64_t other_lobe = 0;
+  std::uint64_t occluded = 0;
+  std::uint64_t non_finite = 0;
+  std::uint64_t hastings = 0;
+
+  Rejections& operator+=(const Rejections& other);
+};
+
+struct KernelStatistics {
+  std::uint64_t proposed = 0;
+  double accepted = 0;  ///< sum of acceptance probabilities
+
+  double acceptance() const { return proposed > 0 ? accepted / static_cast<double>(proposed) : 0; }
+  KernelStatistics& operator+=(const KernelStatistics& other);
+};
+
+struct LangevinStatistics {
+  KernelStatistics large_step;
+  KernelStatistics small_step;
+  Rejections rejections;
+  /// Mutations spent at paths of n edges.
+  std::array<std::uint64_t, kMaxPathLength + 1> path_length{};
+  std::uint64_t mutations = 0;
+  double b = 0;        ///< normalization: mean luminance of the image
+  double b_error = 0;  ///< its standard error
+  double bootstrap_seconds = 0;
+  double render_seconds = 0;
+  bool stopped = false;
+
+  LangevinStatistics& operator+=(const LangevinStatistics& other);
+};
+
+struct LangevinResult {
+  Image image;
+  LangevinStatistics statistics;
+};
+
+/// Renders with the Langevin sampler ([E63]; large steps and normalization as DESIGN 1.8).
+/// `mutations_per_pixel` is the work if no time is given.
+/// Throws OptionError, and InputError if no path of the scene carries light to the sensor.
+LangevinResult render_langevin(const Scene& scene, const LangevinOptions& options,
+                               const RenderOptions& render, double mutations_per_pixel);
+
+struct PathResult {
+  Image image;
+  double samples_per_pixel = 0;
+  double render_seconds = 0;
+  std::uint64_t non_finite = 0;  ///< samples that were NaN or infinite, counted as no light
+  bool stopped = false;
+};
+
+/// Renders with a path tracer: next-event estimation and BSDF sampling, combined with the balance
+/// heuristic (Veach 1997). `samples_per_pixel` is the work if no time is given.
+PathResult render_path(const Scene& scene, const PathOptions& options, const RenderOptions& render,
+                       int samples_per_pixel);
+
+}  // namespace driftlight

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The scene: immutable once built; the only owner of Embree.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "driftlight/bsdf.h"
+#include "driftlight/emitter.h"
+#include "driftlight/geometry.h"
+#include "driftlight/sensor.h"
+#include "driftlight/warp.h"
+
+namespace driftlight {
+
+/// BSDFs (by index) on the two sides of a surface. A transmissive BSDF serves both sides and stands
+/// in `front` alone. No back: the back side is black.
+struct Material {
+  std::uint32_t front = 0;
+  std::optional<std::uint32_t> back;
+};
+
+/// What constraints and emitter sampling know of a shape, computed when the scene is built.
+struct ShapeExtent {
+  double area = 0;
+  Vec3d centroid{0, 0, 0};  ///< of the area
+  /// Rows that whiten the covariance of a uniform point on the shape: |W (p - centroid)|^2 has
+  /// mean 2 or 3. Rows of directions in which the shape has no extent are zero.
+  Eigen::Matrix3d whitening = Eigen::Matrix3d::Zero();
+  /// Root mean square distance from the centroid.
+  double radius = 0;
+  bool planar = false;
+};
+
+struct Shape {
+  Geometry geometry;
+  std::uint32_t material = 0;
+  std::optional<std::uint32_t> emitter;
+  ShapeExtent extent;
+  bool textured = false;            ///< some BSDF of the material looks at uv
+  DiscreteDistribution triangles;   ///< by area; only for meshes that emit
+};
+
+/// A point drawn on an emitter, for a connection.
+struct EmitterPoint {
+  Vec3d p = Vec3d::Zero();
+  Vec3d n = Vec3d::Zero();  ///< unit normal on the emitting side; zero for point emitters
+};
+
+class Scene {
+ public:
+  ~Scene();
+  Scene(Scene&&) noexcept;
+  Scene& operator=(Scene&&) noexcept;
+
+  const PerspectiveCamera& camera() const { return camera_; }
+  std::span<const Shape> shapes() const { return shapes_; }
+  std::span<const Material> materials() const { return materials_; }
+  std::span<const Bsdf> bsdfs() const { return bsdfs_; }
+  std::span<const Emitter> emitters() const { return emitters_; }
+  std::optional<std::uint32_t> environment() const { return environment_; }
+  /// Bounding sphere of all shapes and finite emitters.
+  const Vec3d& center() const { return center_; }
+  double radius() const { return radius_; }
+
+  /// Nearest hit of the ray from `origin` along the unit `direction`, t in (t_min, t_max). If the
+  /// origin lies on a surface with geometric normal n_g, pass origin = leave(p, n_g, direction).
+  Hit intersect(const Vec3d& origin, const Vec3d& direction, double t_min = 0.0,
+                double t_max = std::numeric_limits<double>::infinity()) const;
+  /// True if something lies between a and b, both already moved off their surfaces.
+  bool occluded(const Vec3d& a, const Vec3d& b) const;
+  /// True if something lies on the ray to infinity.
+  bool occluded_to_infinity(const Vec3d& origin, const Vec3d& direction) const;
+  /// p moved off its surface, to the side into which `direction` leaves, by more than the rounding
+  /// of single-precision rays and by less than anything visible.
+  Vec3d leave(const Vec3d& p, const Vec3d& n_g, const Vec3d& direction) const;
+
+  /// The point where the ray meets the primitive of a valid hit.
+  template <Scalar T>
+  Interaction<T> interact(const Hit& hit, const Ray<T>& ray) const {
+    const Shape& shape = shapes_[hit.shape];
+    return driftlight::interact(shape.geometry, hit.primitive, ray, shape.textured);
+  }
+
+  /// The BSDF that acts on the side of wi, or none for a black back side. On the back side of an
+  /// opaque surface the normals of `at` are turned toward wi.
+  template <Scalar T>
+  const Bsdf* bsdf_at(const Hit& hit, const Vec3<T>& wi, Interaction<T>& at) const {
+    const Material& material = materials_[shapes_[hit.shape].material];
+    const Bsdf& front = bsdfs_[material.front];
+    if (value(dot(at.n_g, wi)) > 0.0 || is_transmissive(front)) return &front;
+    if (!material.back) return nullptr;
+    at.n_g = -at.n_g;
+    at.n_s = -at.n_s;
+    return &bsdfs_[*material.back];
+  }
+
+  /// Probability with which emitter sampling picks the emitter.
+  double emitter_probability(std::uint32_t emitter) const {
+    return emitter_choice_.probability(static_cast<int>(emitter));
+  }
+  std::uint32_t sample_emitter(double& u) const {
+    return static_cast<std::uint32_t>(emitter_choice_.sample(u));
+  }
+  /// Uniform point on the shape of an area emitter, density 1 / area.
+  EmitterPoint sample_area(const AreaEmitter& emitter, double u1, double u2) const;
+ private:
+  friend class SceneBuilder;
+  struct Accelerator;
+  Scene();
+
+  PerspectiveCamera camera_;
+  std::vector<Shape> shapes_;
+  std::vector<Material> materials_;
+  std::vector<Bsdf> bsdfs_;
+  std::vector<Emitter> emitters_;
+  std::optional<std::uint32_t> environment_;
+  DiscreteDistribution emitter_choice_;
+  Vec3d center_{0, 0, 0};
+  double radius_ = 1;
+  std::unique_ptr<Accelerator> accelerator_;
+};
+
+/// Collects the parts of a scene. Indices are returned in order from 0.
+class SceneBuilder {
+ public:
+  std::uint32_t add_bsdf(Bsdf bsdf);
+  std::uint32_t add_material(const Material& material);
+  /// With `radiance` the shape is an area emitter. Throws InputError on an empty mesh or one whose
+  /// indices are out of range.
+  std::uint32_t add_shape(Geometry geometry, std::uint32_t material,
+                          std::optional<Rgbd> radiance = std::nullopt);
+  void add_emitter(PointEmitter emitter);
+  /// A ConstantEnvironment or EnvironmentMap. Throws InputError on a second one.
+  void set_environment(Emitter environment);
+  void set_camera(const PerspectiveCamera& camera);
+
+  /// Throws InputError if there is no emitter or no light. The builder is empty afterwards.
+  Scene build();
+
+ private:
+  Scene scene_;
+};
+
+}  // namespace driftlight

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Mitsuba scene files (XML, the 0.5/0.6 dialect).
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "driftlight/error.h"
+#include "driftlight/scene.h"
+
+namespace driftlight {
+
+struct LoadOptions {
+  /// Values for $name in the file; they win over <default>.
+  std::map<std::string, std::string> defines;
+};
+
+struct LoadedScene {
+  Scene scene;
+  /// Longest path in edges, from the file's integrator. None: not given or unbounded (-1).
+  std::optional<int> max_depth;
+  /// Things the user should know, each "file:line:column: ..": an integrator that is not ours, a
+  /// sampler that is not used, and so on. Nothing in it changes the picture.
+  std::vector<std::string> notices;
+};
+
+/// Loads a scene. Throws SceneError (a missing or malformed file, an unknown plugin or property, a
+/// bad number, an unresolved or cyclic ref, a mesh that cannot be read, no sensor, no emitter).
+LoadedScene load_scene(const std::filesystem::path& file, const LoadOptions& options = {});
+
+}  // namespace driftlight

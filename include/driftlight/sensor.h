@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The sensor: a pinhole camera.
+#pragma once
+
+#include <limits>
+
+#include "driftlight/frame.h"
+
+namespace driftlight {
+
+/// A pinhole with its image plane at distance 1. Film coordinates (x, y) run over [0, 1)^2 from the
+/// top left corner of the image.
+struct PerspectiveCamera {
+  Vec3d origin{0, 0, 0};
+  Vec3d right{1, 0, 0};    ///< unit; direction of growing film x
+  Vec3d up{0, 1, 0};       ///< unit; direction of falling film y
+  Vec3d forward{0, 0, 1};  ///< unit
+  double half_width = 1;   ///< of the image plane: tan(fov_x / 2)
+  double half_height = 1;
+  int film_width = 256;  ///< pixels
+  int film_height = 256;
+  double near_clip = 0;  ///< depth along `forward` before which nothing is seen
+  double far_clip = std::numeric_limits<double>::infinity();
+
+  /// Area A of the image plane.
+  double area() const { return 4.0 * half_width * half_height; }
+  double pixel_count() const {
+    return static_cast<double>(film_width) * static_cast<double>(film_height);
+  }
+
+  /// Unit direction through the film point.
+  Vec3d direction(const Vec2d& film) const {
+    return (forward + (2.0 * film.x() - 1.0) * half_width * right +
+            (1.0 - 2.0 * film.y()) * half_height * up)
+        .normalized();
+  }
+
+  /// Cosine between v and the optical axis.
+  template <Scalar T>
+  T cosine(const Vec3<T>& v) const {
+    return dot(forward, v);
+  }
+
+  /// Where the ray with direction v crosses the image plane, in film coordinates. Needs cosine > 0.
+  template <Scalar T>
+  Vec2<T> film_position(const Vec3<T>& v) const {
+    const T inverse = constant<T>(0.5) / cosine(v);
+    return {dot(right, v) * inverse * (1.0 / half_width) + 0.5,
+            0.5 - dot(up, v) * inverse * (1.0 / half_height)};
+  }
+
+  /// True if v goes through the film.
+  bool sees(const Vec3d& v) const {
+    if (!(cosine(v) > 0.0)) return false;
+    const Vec2d film = film_position(v);
+    return film.x() >= 0.0 && film.x() < 1.0 && film.y() >= 0.0 && film.y() < 1.0;
+  }
+
+  /// log W(v) with W = 1 / (A cos^3), so that the integral of W L over solid angle is the mean
+  /// radiance over the film.
+  template <Scalar T>
+  T log_importance(const Vec3<T>& v) const {
+    using std::log;
+    return -3.0 * log(cosine(v)) - std::log(area());
+  }
+};
+
+}  // namespace driftlight

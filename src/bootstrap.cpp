@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "driftlight/bootstrap.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <cmath>
+#include <string>
+
+#include "driftlight/error.h"
+
+namespace driftlight {
+namespace {
+
+struct WeightedEntry {
+  double weight = 0;
+  int entry = 0;
+};
+
+/// Weights f / q of samples 0 .. count - 1 of a purpose; not finite counts as no light, as it does
+/// for a large step.
+std::vector<WeightedEntry> draw(const PathSampler& sampler, const Scene& scene, std::size_t count,
+                                std::uint64_t seed, Stream purpose) {
+  std::vector<WeightedEntry> result(count);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 256), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      Rng rng(seed, purpose, i);
+      const auto sample = sampler.sample(rng);
+      if (!sample) continue;
+      const double log_target =
+          contribution(scene, sample->topology, sample->coordinates).log_target;
+      const double weight =
+          std::exp(log_target - sampler.log_density(sample->topology, sample->coordinates));
+      if (std::isfinite(weight)) result[i] = {weight, sample->entry};
+    }
+  });
+  return result;
+}
+
+}  // namespace
+
+Bootstrap::Bootstrap(PathSampler& sampler, const Scene& scene, int count, std::uint64_t seed)
+    : sampler_(sampler), seed_(seed) {
+  const auto samples = static_cast<std::size_t>(count);
+  std::vector<double> energy(static_cast<std::size_t>(sampler.entry_count()));
+  for (const WeightedEntry& e : draw(sampler, scene, samples / 4, seed, Stream::Pilot))
+    energy[static_cast<std::size_t>(e.entry)] += e.weight;
+  sampler.learn(energy);
+  weights_.reserve(samples);
+  for (const WeightedEntry& e : draw(sampler, scene, samples, seed, Stream::Bootstrap)) {
+    weights_.push_back(e.weight);
+    mean_.add(e.weight);
+  }
+}
+
+std::vector<PathSampler::Sample> Bootstrap::resample(int chains) const {
+  if (!(mean_.sum > 0.0))
+    throw InputError("no path from the sensor to an emitter carries light (" +
+                     std::to_string(weights_.size()) + " samples tried)");
+  Rng rng(seed_, Stream::Resampling, 0);
+  const double offset = rng.uniform();
+  std::vector<PathSampler::Sample> result;
+  result.reserve(static_cast<std::size_t>(chains));
+  double cumulative = 0;
+  for (std::size_t i = 0; i < weights_.size(); ++i) {
+    cumulative += weights_[i];
+    const double reached = cumulative / mean_.sum * chains;
+    while (static_cast<int>(result.size()) < chains &&
+           static_cast<double>(result.size()) + offset < reached) {
+      Rng replay(seed_, Stream::Bootstrap, i);
+      result.push_back(sampler_.sample(replay).value());
+    }
+  }
+  // Rounding of the last sum may leave one out.
+  while (static_cast<int>(result.size()) < chains) result.push_back(result.back());
+  return result;
+}
+
+}  // namespace driftlight

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "driftlight/emitter.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace driftlight {
+
+EnvironmentMap::EnvironmentMap(Bitmap bitmap, const Eigen::Matrix3d& to_world, double scale)
+    : bitmap_(std::move(bitmap)),
+      axis_x_(to_world.col(0)),
+      axis_y_(to_world.col(1)),
+      axis_z_(to_world.col(2)),
+      scale_(scale) {
+  // Within a patch the interpolant is at most the largest corner and at least a quarter of it
+  // somewhere: the mean of the corners keeps f / pdf bounded and the pdf positive where eval is.
+  const auto width = static_cast<std::size_t>(bitmap_.width);
+  std::vector<double> row_weights;
+  std::vector<double> weights(width);
+  for (int row = 0; row <= bitmap_.height; ++row) {
+    const int top = std::max(row - 1, 0);
+    const int bottom = std::min(row, bitmap_.height - 1);
+    for (int x = 0; x < bitmap_.width; ++x) {
+      const int next = (x + 1) % bitmap_.width;
+      const Rgbd sum = (bitmap_.at(x, top) + bitmap_.at(next, top) + bitmap_.at(x, bottom) +
+                        bitmap_.at(next, bottom))
+                           .cast<double>();
+      weights[static_cast<std::size_t>(x)] = 0.25 * luminance(sum) * scale_;
+    }
+    columns_.emplace_back(weights);
+    row_weights.push_back(columns_.back().total() * patch_solid_angle(row));
+  }
+  rows_ = DiscreteDistribution(row_weights);
+  total_ = rows_.total();
+}
+
+/// Patch row r spans the map's y in [r - 1/2, r + 1/2], cut at the poles.
+double EnvironmentMap::patch_solid_angle(int row) const {
+  const double height = bitmap_.height;
+  const double top = kPi * std::max(row - 0.5, 0.0) / height;
+  const double bottom = kPi * std::min(row + 0.5, height) / height;
+  return (std::cos(top) - std::cos(bottom)) * 2.0 * kPi / bitmap_.width;
+}
+
+int EnvironmentMap::row_of(double y) const {
+  return std::clamp(static_cast<int>(std::floor(y + 0.5)), 0, bitmap_.height);
+}
+
+Vec3d EnvironmentMap::sample(double u1, double u2) const {
+  const int row = rows_.sample(u1);
+  const int column = columns_[static_cast<std::size_t>(row)].sample(u2);
+  const double height = bitmap_.height;
+  const double cos_top = std::cos(kPi * std::max(row - 0.5, 0.0) / height);
+  const double cos_bottom = std::cos(kPi * std::min(row + 0.5, height) / height);
+  const double y = cos_top + u1 * (cos_bottom - cos_top);
+  const double r = std::sqrt(std::max(0.0, 1.0 - y * y));
+  const double phi = 2.0 * kPi * (column + 0.5 + u2) / bitmap_.width;
+  return (r * std::sin(phi) * axis_x_ + y * axis_y_ - r * std::cos(phi) * axis_z_).normalized();
+}
+
+double EnvironmentMap::pdf(const Vec3d& d) const {
+  const double dy = std::clamp(axis_y_.dot(d), -1.0, 1.0);
+  const double x =
+      std::atan2(axis_x_.dot(d), -axis_z_.dot(d)) * 0.5 * kInvPi * bitmap_.width - 0.5;
+  const int row = row_of(std::acos(dy) * kInvPi * bitmap_.height);
+  int column = static_cast<int>(std::floor(x)) % bitmap_.width;
+  if (column < 0) column += bitmap_.width;
+  return rows_.probability(row) * columns_[static_cast<std::size_t>(row)].probability(column) /
+         patch_solid_angle(row);
+}
+
+}  // namespace driftlight

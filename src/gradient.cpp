@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "driftlight/gradient.h"
+
+#include <cmath>
+
+#include "driftlight/constraints.h"
+#include "driftlight/contribution.h"
+
+namespace driftlight {
+namespace {
+
+/// Most residuals of a path: two of the film, three of each position, six of each scattering (two
+/// lobes), three of the environment.
+constexpr int kMaxResiduals = 2 + 9 * kMaxPathLength + 3;
+
+/// Jets of a path about the base point of a chart: coordinates [first, first + N) are seeded.
+template <int N>
+class SeededBlocks {
+ public:
+  using T = ceres::Jet<double, N>;
+
+  SeededBlocks(const Chart& chart, int first) : chart_(chart), first_(first) {}
+
+  /// d retract / d (d0, d1) at 0 are the chart's tangents.
+  Vec3<T> operator()(int k) const {
+    const Chart::Block& block = chart_.block(k);
+    Vec3<T> v = constant<T>(block.point);
+    const int column = 2 * k - first_;
+    if (column < 0 || column >= N) return v;
+    for (int i = 0; i < 3; ++i) {
+      v[i].v[column] = block.t[i];
+      v[i].v[column + 1] = block.b[i];
+    }
+    return v;
+  }
+
+ private:
+  const Chart& chart_;
+  int first_;
+};
+
+/// Jets of a path at other tangent coordinates of the chart.
+template <int N>
+class DisplacedBlocks {
+ public:
+  using T = ceres::Jet<double, N>;
+
+  DisplacedBlocks(const Chart& chart, const Vector& delta, int first)
+      : chart_(chart), delta_(delta), first_(first) {}
+
+  Vec3<T> operator()(int k) const {
+    T d0(delta_[2 * k]);
+    T d1(delta_[2 * k + 1]);
+    const int column = 2 * k - first_;
+    if (column >= 0 && column < N) {
+      d0.v[column] = 1.0;
+      d1.v[column + 1] = 1.0;
+    }
+    return chart_.retract(k, d0, d1);
+  }
+
+ private:
+  const Chart& chart_;
+  const Vector& delta_;
+  int first_;
+};
+
+/// Rows sqrt(w) dr of all residuals, a pass of N columns at a time.
+class JacobianRows {
+ public:
+  void begin_pass(int first) {
+    first_ = first;
+    count_ = 0;
+  }
+  template <int N>
+  void add(const ceres::Jet<double, N>& residual, double precision) {
+    rows_.row(count_++).template segment<N>(first_) = std::sqrt(precision) * residual.v.transpose();
+  }
+
+  /// Q = 1/9 R^T R + floor, computed in W >= d columns so that all loops have fixed bounds.
+  template <int W>
+  void accumulate(int d, Matrix& q) const {
+    Eigen::Matrix<double, W, W, Eigen::RowMajor> sum;
+    sum.setZero();
+    for (int i = 0; i < count_; ++i) {
+      const auto row = rows_.row(i).template head<W>();
+      sum.noalias() += row.transpose() * row;
+    }
+    q = (1.0 / 9.0) * sum.topLeftCorner(d, d);
+    q.diagonal().array() += kConstraintFloor;
+  }
+
+ private:
+  // Uninitialised: each pass writes its columns of every row that is read.
+  Eigen::Matrix<double, kMaxResiduals, kMaxDimension, Eigen::RowMajor> rows_;
+  int first_ = 0;
+  int count_ = 0;
+};
+
+/// Both visitors in one walk.
+template <Scalar T>
+struct TargetAndConstraints {
+  ContributionVisitor<T> target;
+  ConstraintVisitor<T, JacobianRows> constraints;
+
+  explicit TargetAndConstraints(JacobianRows& rows) : constraints(rows) {}
+
+  void sensor(const PerspectiveCamera& camera, const Vec3<T>& v) {
+    target.sensor(camera, v);
+    constraints.sensor(camera, v);
+  }
+  void position(const Shape& shape, const Vec3<T>& p) { constraints.position(shape, p); }
+  void scatter(const ScatterEvent<T>& e) {
+    target.scatter(e);
+    constraints.scatter(e);
+  }
+  void connect(const ScatterEvent<T>& e) { scatter(e); }
+  void delta(const ScatterEvent<T>& e) { target.delta(e); }
+  void hit(const AreaEmitter& emitter, const T& cosine, const T& r2) {
+    target.hit(emitter, cosine, r2);
+  }
+  void environment(const Emitter& emitter, const Vec3<T>& v) {
+    target.environment(emitter, v);
+    constraints.environment(emitter, v);
+  }
+  void area_connection(const AreaEmitter& emitter, const T& cosine, const T& r2) {
+    target.area_connection(emitter, cosine, r2);
+  }
+  void point_connection(const PointEmitter& emitter, const T& r2) {
+    target.point_connection(emitter, r2);
+  }
+};
+
+template <int N>
+void store_gradient(const ceres::Jet<double, N>& log_target, int first, Vector& gradient) {
+  const int count = std::min<int>(N, static_cast<int>(gradient.size()) - first);
+  gradient.segment(first, count) = -log_target.v.head(count);
+}
+
+template <int N>
+void differentiate_pass(const Scene& scene, const PathTopology& topology, const Chart& chart,
+                        const DerivativeRequest& request, int first, JacobianRows& rows,
+                        Vector& gradient) {
+  using T = ceres::Jet<double, N>;
+  const SeededBlocks<N> blocks(chart, first);
+  rows.begin_pass(first);
+  if (request.gradient && request.constraints) {
+    TargetAndConstraints<T> visitor(rows);
+    walk<T>(scene, topology, blocks, visitor);
+    store_gradient(visitor.target.log_target(), first, gradient);
+  } else if (request.gradient) {
+    ContributionVisitor<T> visitor;
+    walk<T>(scene, topology, blocks, visitor);
+    store_gradient(visitor.log_target(), first, gradient);
+  } else {
+    ConstraintVisitor<T, JacobianRows> visitor(rows);
+    walk<T>(scene, topology, blocks, visitor);
+  }
+}
+
+void accumulate(const JacobianRows& rows, int d, Matrix& q) {
+  if (d <= 4)
+    rows.accumulate<4>(d, q);
+  else if (d <= 8)
+    rows.accumulate<8>(d, q);
+  else if (d <= 16)
+    rows.accumulate<16>(d, q);
+  else
+    rows.accumulate<kMaxDimension>(d, q);
+}
+
+/// Calls pass(integral_constant<int, N>, first) for the passes that cover d coordinates.
+template <class Pass>
+void for_each_pass(int d, const Pass& pass) {
+  if (d <= 4) {
+    pass(std::integral_constant<int, 4>{}, 0);
+  } else if (d <= 8) {
+    pass(std::integral_constant<int, 8>{}, 0);
+  } else {
+    for (int first = 0; first < d; first += 16) pass(std::integral_constant<int, 16>{}, first);
+  }
+}
+
+}  // namespace
+
+bool PathDerivatives::all_finite(const DerivativeRequest& request) const {
+  return (!request.gradient || gradient.allFinite()) && (!request.constraints || q.allFinite());
+}
+
+void differentiate(const Scene& scene, const PathTopology& topology, const Chart& chart,
+                   const DerivativeRequest& request, PathDerivatives& result) {
+  if (!request.gradient && !request.constraints) return;
+  const int d = chart.dimension();
+  JacobianRows rows;
+  result.gradient.resize(request.gradient ? d : 0);
+  for_each_pass(d, [&](auto width, int first) {
+    differentiate_pass<width()>(scene, topology, chart, request, first, rows, result.gradient);
+  });
+  if (request.constraints) accumulate(rows, d, result.q);
+}
+
+void constraint_matrix(const Scene& scene, const PathTopology& topology, const Chart& chart,
+                       const Vector& delta, Matrix& q) {
+  const int d = chart.dimension();
+  JacobianRows rows;
+  for_each_pass(d, [&](auto width, int first) {
+    using T = ceres::Jet<double, width()>;
+    const DisplacedBlocks<width()> blocks(chart, delta, first);
+    rows.begin_pass(first);
+    ConstraintVisitor<T, JacobianRows> visitor(rows);
+    walk<T>(scene, topology, blocks, visitor);
+  });
+  accumulate(rows, d, q);
+}
+
+Vector divergence(const Scene& scene, const PathTopology& topology, const Chart& chart,
+                  const Matrix& q_inverse) {
+  const int d = chart.dimension();
+  Matrix plus;
+  Matrix minus;
+  Vector delta = Vector::Zero(d);
+  Vector sum = Vector::Zero(d);
+  for (int j = 0; j < d; ++j) {
+    // A step of a thousandth of the constraint's own width: far above rounding, far below curvature.
+    const double h = 1e-3 * std::min(1.0, std::sqrt(q_inverse(j, j)) / 3.0);
+    delta[j] = h;
+    constraint_matrix(scene, topology, chart, delta, plus);
+    delta[j] = -h;
+    constraint_matrix(scene, topology, chart, delta, minus);
+    delta[j] = 0.0;
+    const Matrix slope = (plus - minus) / (2.0 * h);
+    sum += slope.selfadjointView<Eigen::Lower>() * q_inverse.col(j);
+  }
+  return -(q_inverse.selfadjointView<Eigen::Lower>() * sum);
+}
+
+}  // namespace driftlight

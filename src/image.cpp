@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "driftlight/image.h"
+
+#include <OpenImageIO/imageio.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <limits>
+#include <memory>
+
+#include "driftlight/error.h"
+#include "pending_file.h"
+
+namespace driftlight {
+
+namespace {
+
+/// IEC 61966-2-1: encoded value -> linear light.
+float from_srgb(float x) {
+  return x <= 0.04045F ? x / 12.92F : std::pow((x + 0.055F) / 1.055F, 2.4F);
+}
+
+/// Linear light -> the nearest of 256 encoded values. NaN becomes 0.
+std::uint8_t to_srgb8(float x) {
+  const float y = x <= 0.0031308F ? 12.92F * x : 1.055F * std::pow(x, 1.0F / 2.4F) - 0.055F;
+  return y > 0.0F ? static_cast<std::uint8_t>(std::min(y, 1.0F) * 255.0F + 0.5F) : std::uint8_t{0};
+}
+
+std::string lower_extension(const std::filesystem::path& file) {
+  std::string extension = file.extension().string();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return extension;
+}
+
+/// OpenImageIO reads PFM but does not write it.
+bool is_pfm(const std::filesystem::path& file) { return lower_extension(file) == ".pfm"; }
+
+bool stores_floats(const std::filesystem::path& file) {
+  const std::string extension = lower_extension(file);
+  return extension == ".exr" || extension == ".hdr";
+}
+
+/// A message of OpenImageIO without the line ends that it comes with.
+std::string one_line(std::string message) {
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  while (!message.empty() && message.back() == ' ') message.pop_back();
+  return message;
+}
+
+[[noreturn]] void fail_to_write(const std::filesystem::path& file, const std::string& why) {
+  throw RuntimeError(fmt::format("cannot write '{}': {}", file.string(), one_line(why)));
+}
+
+std::unique_ptr<OIIO::ImageOutput> make_output(const std::filesystem::path& file) {
+  auto output = OIIO::ImageOutput::create(file.string());
+  if (!output) {
+    OIIO::geterror();  // forgets the message
+    throw InputError(
+        fmt::format("cannot write '{}': no image format ends in '{}'; .exr, .pfm, "
+                    ".hdr, .png, .jpg and .tif are some that do",
+                    file.string(), file.extension().string()));
+  }
+  return output;
+}
+
+/// Portable float map: rows from the bottom, negative scale for little-endian numbers.
+void write_pfm(const PendingFile& file, const Image& image) {
+  static_assert(std::endian::native == std::endian::little);
+  std::ofstream out(file.temporary(), std::ios::binary);
+  out << "PF\n" << image.width << ' ' << image.height << "\n-1.0\n";
+  const auto row_bytes = static_cast<std::streamsize>(sizeof(float)) * 3 * image.width;
+  for (int y = image.height - 1; y >= 0; --y)
+    out.write(reinterpret_cast<const char*>(image.pixel(0, y)), row_bytes);
+  out.close();
+  if (!out) fail_to_write(file.target(), "the disk is full or the folder is not writable");
+}
+
+void write_oiio(const PendingFile& file, const Image& image,
+                const std::map<std::string, std::string>& metadata) {
+  const auto output = make_output(file.temporary());
+  const bool floats = stores_floats(file.target());
+  OIIO::ImageSpec spec(image.width, image.height, 3,
+                       floats ? OIIO::TypeDesc::FLOAT : OIIO::TypeDesc::UINT8);
+  spec.attribute("oiio:ColorSpace", floats ? "Linear" : "sRGB");
+  // Without a date here some formats store the present one, and no two files are the same.
+  spec.attribute("DateTime", "");
+  for (const auto& [name, text] : metadata) spec.attribute(name, text);
+
+  if (!output->open(file.temporary().string(), spec))
+    fail_to_write(file.target(), output->geterror());
+  bool written = false;
+  if (floats) {
+    written = output->write_image(OIIO::TypeDesc::FLOAT, image.rgb.data());
+  } else {
+    std::vector<std::uint8_t> bytes(image.rgb.size());
+    std::transform(image.rgb.begin(), image.rgb.end(), bytes.begin(), to_srgb8);
+    written = output->write_image(OIIO::TypeDesc::UINT8, bytes.data());
+  }
+  if (!output->close() || !written) fail_to_write(file.target(), output->geterror());
+}
+
+}  // namespace
+
+Image read_image(const std::filesystem::path& file) {
+  const auto fail = [&](const std::string& why) {
+    throw InputError(fmt::format("cannot read image '{}': {}", file.string(), one_line(why)));
+  };
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(file, ignored)) fail("there is no such file");
+  const auto input = OIIO::ImageInput::open(file.string());
+  if (!input) fail(OIIO::geterror());
+  const OIIO::ImageSpec& spec = input->spec();
+  const int channels = spec.nchannels >= 3 ? 3 : 1;
+  Image image(spec.width, spec.height);
+  std::vector<float> data(image.rgb.size() / 3 * static_cast<std::size_t>(channels));
+  if (!input->read_image(0, 0, 0, channels, OIIO::TypeDesc::FLOAT, data.data()))
+    fail(input->geterror());
+  const bool encoded =
+      spec.format == OIIO::TypeDesc::UINT8 || spec.format == OIIO::TypeDesc::UINT16;
+  if (encoded) std::transform(data.begin(), data.end(), data.begin(), from_srgb);
+  if (channels == 3) {
+    image.rgb = std::move(data);
+  } else {
+    for (std::size_t i = 0; i < data.size(); ++i) std::fill_n(&image.rgb[3 * i], 3, data[i]);
+  }
+  return image;
+}
+
+void write_image(const std::filesystem::path& file, const Image& image,
+                 const std::map<std::string, std::string>& metadata) {
+  PendingFile pending(file);
+  if (is_pfm(file))
+    write_pfm(pending, image);
+  else
+    write_oiio(pending, image, metadata);
+  pending.commit();
+}
+
+void check_writable(const std::filesystem::path& file) {
+  if (!is_pfm(file)) make_output(file);
+  check_target(file);
+}
+
+Difference difference(const Image& image, const Image& reference) {
+  if (image.width != reference.width || image.height != reference.height)
+    throw InputError(fmt::format("the images differ in size: {} x {} against {} x {}", image.width,
+                                 image.height, reference.width, reference.height));
+  double sum_squared = 0;
+  double sum_relative = 0;
+  double sum_absolute = 0;
+  double sum_image = 0;
+  double sum_reference = 0;
+  const std::size_t pixels = image.rgb.size() / 3;
+  std::vector<double> relative(pixels);
+  for (std::size_t i = 0; i < image.rgb.size(); ++i) {
+    const auto x = static_cast<double>(image.rgb[i]);
+    const auto r = static_cast<double>(reference.rgb[i]);
+    const double squared = (x - r) * (x - r);
+    sum_squared += squared;
+    relative[i / 3] += squared / (r * r + 0.01);
+    sum_absolute += std::abs(x - r) / (std::abs(r) + 0.01);
+    sum_image += x;
+    sum_reference += r;
+  }
+  for (const double x : relative) sum_relative += x;
+
+  // The smallest 99.9 % come first; what is not a number counts as the largest.
+  const std::size_t kept = pixels - pixels / 1000;
+  for (double& x : relative)
+    if (std::isnan(x)) x = std::numeric_limits<double>::infinity();
+  if (kept < pixels)
+    std::nth_element(relative.begin(), relative.begin() + static_cast<std::ptrdiff_t>(kept),
+                     relative.end());
+  double sum_trimmed = 0;
+  for (std::size_t i = 0; i < kept; ++i) sum_trimmed += relative[i];
+
+  const auto values = static_cast<double>(image.rgb.size());
+  return {.mse = sum_squared / values,
+          .relmse = sum_relative / values,
+          .relmse_trimmed = sum_trimmed / (3.0 * static_cast<double>(kept)),
+          .mape = sum_absolute / values,
+          .mean = sum_image / sum_reference};
+}
+
+}  // namespace driftlight

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "driftlight/options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <system_error>
+
+#include "driftlight/error.h"
+
+namespace driftlight {
+
+namespace {
+
+/// Numbers that an option takes: [low, high], or (low, high] if `open`.
+template <class T>
+struct Range {
+  T low;
+  T high = std::numeric_limits<T>::max();
+  bool open = false;
+
+  bool contains(T x) const { return (open ? x > low : x >= low) && x <= high; }
+};
+
+std::string describe(const Range<double>& range) {
+  if (range.high < std::numeric_limits<double>::max())
+    return fmt::format("number in {}{}, {}]", range.open ? '(' : '[', range.low, range.high);
+  return fmt::format("number {} {}", range.open ? ">" : ">=", range.low);
+}
+
+std::string describe(const Range<int>& range) {
+  return fmt::format("integer in [{}, {}]", range.low, range.high);
+}
+
+/// The whole text as a finite number, or none.
+template <class T>
+std::optional<T> parse(const std::string& text) {
+  T x{};
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, x);
+  if (error != std::errc() || stop != end) return std::nullopt;
+  if constexpr (std::is_floating_point_v<T>) {
+    if (!std::isfinite(x)) return std::nullopt;
+  }
+  return x;
+}
+
+[[noreturn]] void fail(std::string_view name, const std::string& value, const std::string& values) {
+  throw OptionError(fmt::format("option {} = '{}': must be {}", name, value, values));
+}
+
+template <class T>
+OptionEntry number(std::string_view name, T& field, const Range<T>& range, std::string_view help) {
+  const std::string values = describe(range);
+  return {name, values, help, [&field] { return fmt::format("{}", field); },
+          [&field, name, range, values](const std::string& text) {
+            const std::optional<T> x = parse<T>(text);
+            if (!x || !range.contains(*x)) fail(name, text, values);
+            field = *x;
+          }};
+}
+
+/// `words[i]` names the enumerator of value i.
+template <class Enum, std::size_t N>
+OptionEntry choice(std::string_view name, Enum& field, const std::array<std::string_view, N>& words,
+                   std::string_view help) {
+  const std::string values = fmt::format("{}", fmt::join(words, "|"));
+  return {name, values, help,
+          [&field, words] { return std::string(words.at(static_cast<std::size_t>(field))); },
+          [&field, name, words, values](const std::string& text) {
+            const auto* word = std::find(words.begin(), words.end(), text);
+            if (word == words.end()) fail(name, text, values);
+            field = static_cast<Enum>(word - words.begin());
+          }};
+}
+
+OptionEntry max_depth(int& field) {
+  return number("max_depth", field, Range<int>{1, kMaxPathLength}, "longest path, in edges");
+}
+
+/// Every value must survive its own text form, which `set` checks.
+void check(const std::vector<OptionEntry>& entries) {
+  for (const OptionEntry& entry : entries) entry.set(entry.get());
+}
+
+}  // namespace
+
+std::vector<OptionEntry> entries(LangevinOptions& options) {
+  constexpr std::array<std::string_view, 3> kDrifts{"none", "gradient", "full"};
+  constexpr std::array<std::string_view, 2> kPreconditioners{"identity", "constraints"};
+  const Range<double> positive{.low = 0, .open = true};
+  KernelOptions& kernel = options.kernel;
+  return {
+      choice("drift", kernel.drift, kDrifts,
+             "drift of a small step: Brownian, -T T* grad U, or that + div(T T*)"),
+      choice("preconditioner", kernel.preconditioner, kPreconditioners,
+             "step matrix: the same in all directions, or from the path's constraints"),
+      number("epsilon", kernel.epsilon, positive, "bound of dt |(a, grad U)|"),
+      number("safety", kernel.safety, positive, "divisor of the time step"),
+      number("time_step_cap", kernel.time_step_cap, positive, "largest time step"),
+      number("scale", kernel.scale, positive, "factor on the step matrix T"),
+      number("scale_decades", kernel.scale_decades, Range<double>{0, 10},
+             "decades over which each step draws its scale; 0: fixed"),
+      number("large_step_probability", options.large_step_probability, Range<double>{0, 1},
+             "probability of an independent proposal"),
+      number("chains", options.chains, Range<int>{1, 1000000},
+             "independent chains; the image depends on it, not on the threads"),
+      number("bootstrap", options.bootstrap, Range<int>{1, 1000000000},
+             "samples that find the mean brightness and start the chains"),
+      max_depth(options.max_depth),
+  };
+}
+
+std::vector<OptionEntry> entries(PathOptions& options) { return {max_depth(options.max_depth)}; }
+
+void LangevinOptions::validate() const {
+  LangevinOptions copy = *this;
+  check(entries(copy));
+}
+
+void PathOptions::validate() const {
+  PathOptions copy = *this;
+  check(entries(copy));
+}
+
+void set_option(const std::vector<OptionEntry>& entries, const std::string& name,
+                const std::string& value) {
+  std::vector<std::string_view> names;
+  for (const OptionEntry& entry : entries) {
+    if (entry.name == name) return entry.set(value);
+    names.push_back(entry.name);
+  }
+  throw OptionError(
+      fmt::format("unknown option '{}'; the options are {}", name, fmt::join(names, ", ")));
+}
+
+}  // namespace driftlight

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "driftlight/phase_space.h"
+
+#include <cmath>
+
+#include "driftlight/walk.h"
+#include "ray_follower.h"
+
+namespace driftlight {
+
+bool connects_to_area(const Bsdf& last, const Shape& emitter) {
+  return is_diffuse(last) &&
+         (emitter.extent.planar || std::holds_alternative<Sphere>(emitter.geometry));
+}
+
+bool passes(const Interaction<double>& at, const Vec3d& wi, const Vec3d& wo) {
+  return at.n_g.dot(wi) * at.n_s.dot(wi) > 0.0 && at.n_g.dot(wo) * at.n_s.dot(wo) > 0.0;
+}
+
+namespace {
+
+/// Follows the pattern of a path along other coordinates.
+class Tracer {
+ public:
+  Tracer(const Scene& scene, const PathTopology& pattern, const PathCoordinates& coordinates,
+         PathTopology& result)
+      : scene_(scene),
+        pattern_(pattern),
+        coordinates_(coordinates),
+        result_(result),
+        follower_(scene, coordinates(0)) {
+    result_.scatter_count = pattern.scatter_count;
+    result_.block_count = pattern.block_count;
+    result_.end = pattern.end;
+    result_.emitter = pattern.emitter;
+  }
+
+  TraceStatus run() {
+    if (!scene_.camera().sees(coordinates_(0))) return TraceStatus::Missed;
+    for (int k = 0; k < pattern_.scatter_count; ++k) {
+      const TraceStatus status = scatter(k);
+      if (status != TraceStatus::Ok) return status;
+    }
+    if (pattern_.end == PathEnd::Hit) return hit_emitter();
+    if (pattern_.end == PathEnd::Environment && follower_.next_hit().valid())
+      return TraceStatus::Occluded;
+    return TraceStatus::Ok;
+  }
+
+ private:
+  /// Finds vertex k and what lies beyond: the ray that leaves it or the connection to the emitter.
+  TraceStatus scatter(int k) {
+    const auto index = static_cast<std::size_t>(k);
+    const PathVertex& wanted = pattern_.vertices[index];
+    const Hit hit = follower_.next_hit();
+    if (!hit.valid()) return TraceStatus::Missed;
+    const SurfaceHit surface = follower_.surface(hit);
+    if (surface.bsdf == nullptr) return TraceStatus::Missed;
+    if (is_delta(*surface.bsdf) != wanted.delta) return TraceStatus::OtherLobe;
+    result_.vertices[index] = wanted;
+    result_.vertices[index].hit = hit;
+    bsdf_ = surface.bsdf;
+    if (pattern_.ends_in_connection() && k + 1 == pattern_.scatter_count)
+      return connect(surface, wanted);
+
+    Vec3d wo;
+    if (wanted.delta) {
+      if (wanted.scattering == Scattering::Transmission && !is_transmissive(*surface.bsdf))
+        return TraceStatus::OtherLobe;
+      wo = delta_direction(*surface.bsdf, surface.surface(), surface.wi, wanted.scattering);
+      if (!wo.allFinite()) return TraceStatus::OtherLobe;  // total reflection
+    } else {
+      wo = coordinates_(next_block_++);
+    }
+    if (surface.side(wo) != wanted.scattering) return TraceStatus::OtherLobe;
+    if (!passes(surface.at, surface.wi, wo)) return TraceStatus::Missed;
+    follower_.leave(surface, wo);
+    return TraceStatus::Ok;
+  }
+
+  TraceStatus connect(const SurfaceHit& surface, const PathVertex& wanted) {
+    const Emitter& emitter = scene_.emitters()[pattern_.emitter];
+    EmitterPoint y;
+    if (const auto* light = std::get_if<AreaEmitter>(&emitter)) {
+      const Shape& shape = scene_.shapes()[light->shape];
+      if (!connects_to_area(*surface.bsdf, shape)) return TraceStatus::OtherLobe;
+      y.p = coordinates_(next_block_);
+      y.n = emitter_normal(shape, y.p);
+    } else {
+      y.p = std::get<PointEmitter>(emitter).position;
+    }
+    const Vec3d edge = y.p - surface.at.p;
+    if (surface.side(edge) != wanted.scattering) return TraceStatus::OtherLobe;
+    if (!passes(surface.at, surface.wi, edge)) return TraceStatus::Missed;
+    return connection_status(scene_, surface, emitter, y);
+  }
+
+  TraceStatus hit_emitter() {
+    const Hit hit = follower_.next_hit();
+    if (!hit.valid()) return TraceStatus::Missed;
+    const Shape& shape = scene_.shapes()[hit.shape];
+    if (!shape.emitter) return TraceStatus::Missed;
+    if (bsdf_ != nullptr && connects_to_area(*bsdf_, shape)) return TraceStatus::OtherLobe;
+    result_.vertices[result_.scatter_count].hit = hit;
+    result_.emitter = *shape.emitter;
+    return TraceStatus::Ok;
+  }
+
+  const Scene& scene_;
+  const PathTopology& pattern_;
+  const PathCoordinates& coordinates_;
+  PathTopology& result_;
+  RayFollower follower_;
+  int next_block_ = 1;
+  const Bsdf* bsdf_ = nullptr;  ///< of the last scattering vertex so far
+};
+
+}  // namespace
+
+TraceStatus trace(const Scene& scene, const PathTopology& pattern,
+                  const PathCoordinates& coordinates, PathTopology& result) {
+  return Tracer(scene, pattern, coordinates, result).run();
+}
+
+// ---- Chart ----------------------------------------------------------------------------------
+
+Chart::Chart(const Scene& scene, const PathTopology& topology,
+             const PathCoordinates& coordinates)
+    : count_(topology.block_count) {
+  for (int k = 0; k < count_; ++k) {
+    Block& block = blocks_[static_cast<std::size_t>(k)];
+    block.point = coordinates(k);
+    block.normal = block.point;
+    block.radius = 1.0;
+    block.length = 1.0;
+    if (topology.end == PathEnd::AreaConnection && k + 1 == count_) {
+      const auto& light = std::get<AreaEmitter>(scene.emitters()[topology.emitter]);
+      const Shape& shape = scene.shapes()[light.shape];
+      const auto* sphere = std::get_if<Sphere>(&shape.geometry);
+      block.radius = sphere != nullptr ? sphere->radius : 0.0;
+      block.normal = sphere != nullptr
+                         ? Vec3d((block.point - sphere->center).normalized())
+                         : emitter_normal(shape, block.point);
+      block.length = shape.extent.radius;
+    }
+    const TangentBasis basis = tangent_basis(block.normal);
+    block.t = block.length * basis.t;
+    block.b = block.length * basis.b;
+  }
+}
+
+void Chart::rotate(int k, double angle) {
+  Block& block = blocks_[static_cast<std::size_t>(k)];
+  const Vec3d t = std::cos(angle) * block.t + std::sin(angle) * block.b;
+  block.b = std::cos(angle) * block.b - std::sin(angle) * block.t;
+  block.t = t;
+}
+
+PathCoordinates Chart::retract(const Vector& delta) const {
+  PathCoordinates result;
+  for (int k = 0; k < count_; ++k) result(k) = retract(k, delta[2 * k], delta[2 * k + 1]);
+  return result;
+}
+
+std::optional<Chart::Inverse> Chart::inverse(const PathCoordinates& to) const {
+  Inverse result;
+  result.delta.resize(dimension());
+  result.log_jacobian = 0;
+  for (int k = 0; k < count_; ++k) {
+    const Block& block = this->block(k);
+    Vec3d step = to(k) - block.point;
+    if (block.radius > 0.0) {
+      // to - center = R n' and n' / (n.n') is the gnomonic image of n'.
+      const Vec3d n = block.normal + step / block.radius;
+      const double cosine = block.normal.dot(n);
+      if (!(cosine > 0.0)) return std::nullopt;
+      step = block.radius / cosine * n;
+      result.log_jacobian -= 3.0 * std::log(cosine);
+    }
+    const double inverse_square = 1.0 / (block.length * block.length);
+    result.log_jacobian += std::log(inverse_square);
+    result.delta[2 * k] = block.t.dot(step) * inverse_square;
+    result.delta[2 * k + 1] = block.b.dot(step) * inverse_square;
+  }
+  return result;
+}
+
+}  // namespace driftlight

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ray_follower.h"
+
+namespace driftlight {
+
+TraceStatus connection_status(const Scene& scene, const SurfaceHit& from, const Emitter& emitter,
+                              const EmitterPoint& y) {
+  const Vec3d edge = y.p - from.at.p;
+  const Vec3d start = scene.leave(from.at.p, from.at.n_g, edge);
+  const auto* light = std::get_if<AreaEmitter>(&emitter);
+  if (light == nullptr)
+    return scene.occluded(start, y.p) ? TraceStatus::Occluded : TraceStatus::Ok;
+  if (y.n.dot(edge) >= 0.0) return TraceStatus::Missed;
+  // The first thing in this direction must be y itself: rounding decides nothing but the
+  // primitive, and a part of the same shape in front of y is told apart by its distance.
+  const Ray<double> ray{start, (y.p - start).normalized()};
+  const Hit hit = scene.intersect(ray.origin, ray.direction);
+  if (!hit.valid()) return TraceStatus::Missed;
+  if (hit.shape != light->shape) return TraceStatus::Occluded;
+  const double error = (scene.interact(hit, ray).p - y.p).norm();
+  return error < 1e-3 * edge.norm() ? TraceStatus::Ok : TraceStatus::Occluded;
+}
+
+}  // namespace driftlight

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+/// A ray on its way through the scene, shared by tracing, path sampling and path tracing.
+#pragma once
+
+#include "driftlight/phase_space.h"
+
+namespace driftlight {
+
+/// A surface point that a ray has come to.
+struct SurfaceHit {
+  Hit hit;
+  Interaction<double> at;
+  Vec3d wi;
+  bool front;        ///< wi is on the side of the shape's outward normal
+  const Bsdf* bsdf;  ///< null on the black back side of an opaque surface
+
+  SurfacePoint<double> surface() const { return {at.n_s, at.uv}; }
+  Scattering side(const Vec3d& wo) const {
+    return at.n_g.dot(wi) * at.n_g.dot(wo) > 0.0 ? Scattering::Reflection
+                                                 : Scattering::Transmission;
+  }
+};
+
+class RayFollower {
+ public:
+  /// Starts at the sensor.
+  RayFollower(const Scene& scene, const Vec3d& v)
+      : scene_(scene),
+        ray_{scene.camera().origin, v},
+        start_(ray_.origin),
+        t_min_(scene.camera().near_clip / scene.camera().cosine(v)),
+        t_max_(scene.camera().far_clip / scene.camera().cosine(v)) {}
+
+  const Ray<double>& ray() const { return ray_; }
+
+  Hit next_hit() {
+    const Hit hit = scene_.intersect(start_, ray_.direction, t_min_, t_max_);
+    t_min_ = 0.0;
+    t_max_ = std::numeric_limits<double>::infinity();
+    return hit;
+  }
+
+  /// The surface point of a valid hit of the current ray.
+  SurfaceHit surface(const Hit& hit) const {
+    SurfaceHit result{hit, scene_.interact(hit, ray_), -ray_.direction, false, nullptr};
+    result.front = result.at.n_g.dot(result.wi) > 0.0;
+    result.bsdf = scene_.bsdf_at(hit, result.wi, result.at);
+    return result;
+  }
+
+  void leave(const SurfaceHit& from, const Vec3d& wo) {
+    ray_ = {from.at.p, wo};
+    start_ = scene_.leave(from.at.p, from.at.n_g, wo);
+  }
+
+ private:
+  const Scene& scene_;
+  Ray<double> ray_;
+  Vec3d start_;  ///< the origin, moved off its surface
+  double t_min_;
+  double t_max_;
+};
+
+/// Whether light passes straight from the point y of a point or area emitter to a surface point.
+/// Missed: y shows its back, or something that is not y is seen in its direction on the same shape.
+TraceStatus connection_status(const Scene& scene, const SurfaceHit& from, const Emitter& emitter,
+                              const EmitterPoint& y);
+
+}  // namespace driftlight

@@ -1,0 +1,441 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "driftlight/scene.h"
+
+#include <embree3/rtcore.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "driftlight/error.h"
+
+namespace driftlight {
+
+// ---- Embree ---------------------------------------------------------------------------------
+
+struct Scene::Accelerator {
+  RTCDevice device = nullptr;
+  RTCScene scene = nullptr;
+
+  Accelerator() : device(rtcNewDevice("threads=0,set_affinity=0")) {
+    if (device == nullptr) throw RuntimeError("Embree cannot be initialised on this machine");
+    scene = rtcNewScene(device);
+    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
+  }
+  Accelerator(const Accelerator&) = delete;
+  Accelerator& operator=(const Accelerator&) = delete;
+  ~Accelerator() {
+    rtcReleaseScene(scene);
+    rtcReleaseDevice(device);
+  }
+};
+
+namespace {
+
+/// Roots of a quadric shape along a ray, in increasing t. `primitive` as Hit has it.
+struct Roots {
+  int count = 0;
+  std::array<double, 2> t{};
+};
+
+Roots roots(const Sphere& sphere, const Vec3d& origin, const Vec3d& direction) {
+  const Vec3d oc = origin - sphere.center;
+  const double b = oc.dot(direction);
+  const double discriminant = b * b - (oc.squaredNorm() - sphere.radius * sphere.radius);
+  if (discriminant < 0.0) return {};
+  const double root = std::sqrt(discriminant);
+  return {2, {-b - root, -b + root}};
+}
+
+Roots roots(const Disk& disk, const Vec3d& origin, const Vec3d& direction) {
+  const Vec3d n = disk.u.cross(disk.v);
+  const double t = n.dot(disk.center - origin) / n.dot(direction);
+  const Vec3d p = origin + t * direction - disk.center;
+  const double n2 = n.squaredNorm();
+  const double s = disk.v.cross(n).dot(p) / n2;
+  const double q = n.cross(disk.u).dot(p) / n2;
+  if (!(s * s + q * q <= 1.0)) return {};
+  return {1, {t, 0}};
+}
+
+/// First root within the ray's interval, as (index, t).
+template <class Shape, class RayType>
+std::optional<std::pair<unsigned, double>> first_root(const Shape& shape, const RayType& ray) {
+  const Vec3d origin(static_cast<double>(ray.org_x), static_cast<double>(ray.org_y),
+                     static_cast<double>(ray.org_z));
+  const Vec3d direction(static_cast<double>(ray.dir_x), static_cast<double>(ray.dir_y),
+                        static_cast<double>(ray.dir_z));
+  // The direction is a unit vector of floats: measure t along it as Embree does.
+  const double length = direction.norm();
+  const Roots found = roots(shape, origin, direction / length);
+  for (int i = 0; i < found.count; ++i) {
+    const double t = found.t[static_cast<std::size_t>(i)] / length;
+    if (t > static_cast<double>(ray.tnear) && t < static_cast<double>(ray.tfar))
+      return std::pair{static_cast<unsigned>(i), t};
+  }
+  return std::nullopt;
+}
+
+/// Embree's callbacks for a shape that is solved in double.
+template <class Shape>
+struct UserShape {
+  static void intersect(const RTCIntersectFunctionNArguments* args) {
+    if (args->valid[0] == 0) return;
+    auto* ray = reinterpret_cast<RTCRayHit*>(args->rayhit);
+    const auto root = first_root(*static_cast<const Shape*>(args->geometryUserPtr), ray->ray);
+    if (!root) return;
+    ray->ray.tfar = static_cast<float>(root->second);
+    ray->hit.geomID = args->geomID;
+    ray->hit.primID = root->first;
+    ray->hit.instID[0] = args->context->instID[0];
+  }
+  static void occluded(const RTCOccludedFunctionNArguments* args) {
+    if (args->valid[0] == 0) return;
+    auto* ray = reinterpret_cast<RTCRay*>(args->ray);
+    if (first_root(*static_cast<const Shape*>(args->geometryUserPtr), *ray))
+      ray->tfar = -std::numeric_limits<float>::infinity();
+  }
+};
+
+/// Bounds rounded outward.
+RTCBounds to_bounds(const Eigen::AlignedBox3d& box) {
+  const auto down = [](double x) {
+    return std::nextafter(static_cast<float>(x), -std::numeric_limits<float>::infinity());
+  };
+  const auto up = [](double x) {
+    return std::nextafter(static_cast<float>(x), std::numeric_limits<float>::infinity());
+  };
+  RTCBounds bounds{};
+  bounds.lower_x = down(box.min().x());
+  bounds.lower_y = down(box.min().y());
+  bounds.lower_z = down(box.min().z());
+  bounds.upper_x = up(box.max().x());
+  bounds.upper_y = up(box.max().y());
+  bounds.upper_z = up(box.max().z());
+  return bounds;
+}
+
+Eigen::AlignedBox3d bounds_of(const TriangleMesh& mesh) {
+  Eigen::AlignedBox3d box;
+  for (const auto& p : mesh.positions) box.extend(p.cast<double>());
+  return box;
+}
+Eigen::AlignedBox3d bounds_of(const Sphere& sphere) {
+  return {sphere.center.array() - sphere.radius, sphere.center.array() + sphere.radius};
+}
+Eigen::AlignedBox3d bounds_of(const Disk& disk) {
+  const Vec3d half = (disk.u.array().square() + disk.v.array().square()).sqrt();
+  return {disk.center - half, disk.center + half};
+}
+
+RTCGeometry embree_geometry(RTCDevice device, const TriangleMesh& mesh) {
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  auto* vertices = static_cast<float*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                              3 * sizeof(float), mesh.positions.size()));
+  for (const auto& p : mesh.positions) vertices = std::copy_n(p.data(), 3, vertices);
+  auto* indices = static_cast<std::uint32_t*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                              3 * sizeof(std::uint32_t), mesh.triangles.size()));
+  for (const auto& t : mesh.triangles) indices = std::copy_n(t.data(), 3, indices);
+  return geometry;
+}
+
+template <class Shape>
+RTCGeometry embree_geometry(RTCDevice device, const Shape& shape) {
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(geometry, 1);
+  rtcSetGeometryUserData(geometry, const_cast<Shape*>(&shape));
+  rtcSetGeometryBoundsFunction(
+      geometry,
+      [](const RTCBoundsFunctionArguments* args) {
+        *args->bounds_o = to_bounds(bounds_of(*static_cast<const Shape*>(args->geometryUserPtr)));
+      },
+      nullptr);
+  rtcSetGeometryIntersectFunction(geometry, &UserShape<Shape>::intersect);
+  rtcSetGeometryOccludedFunction(geometry, &UserShape<Shape>::occluded);
+  return geometry;
+}
+
+RTCRay embree_ray(const Vec3d& origin, const Vec3d& direction, double t_min, double t_max) {
+  RTCRay ray{};
+  ray.org_x = static_cast<float>(origin.x());
+  ray.org_y = static_cast<float>(origin.y());
+  ray.org_z = static_cast<float>(origin.z());
+  ray.dir_x = static_cast<float>(direction.x());
+  ray.dir_y = static_cast<float>(direction.y());
+  ray.dir_z = static_cast<float>(direction.z());
+  ray.tnear = static_cast<float>(t_min);
+  ray.tfar = static_cast<float>(t_max);
+  ray.mask = ~0U;
+  return ray;
+}
+
+// ---- Extents of shapes ----------------------------------------------------------------------
+
+/// Area, centroid and covariance of the uniform distribution on a surface.
+struct Moments {
+  double area = 0;
+  Vec3d mean = Vec3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+};
+
+/// A triangle has E[p p^T] = (s s^T + sum_i p_i p_i^T) / 12 with s = p_0 + p_1 + p_2.
+Moments moments(const TriangleMesh& mesh) {
+  const Vec3d origin = mesh.positions.front().cast<double>();
+  Moments m;
+  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    const std::array<Vec3d, 3> p = corners(mesh, i);
+    const double area = 0.5 * (p[1] - p[0]).cross(p[2] - p[0]).norm();
+    Vec3d sum = Vec3d::Zero();
+    Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
+    for (const Vec3d& corner : p) {
+      const Vec3d q = corner - origin;
+      sum += q;
+      products += q * q.transpose();
+    }
+    m.area += area;
+    m.mean += area / 3.0 * sum;
+    second += area / 12.0 * (sum * sum.transpose() + products);
+  }
+  m.mean /= m.area;
+  m.covariance = second / m.area - m.mean * m.mean.transpose();
+  m.mean += origin;
+  return m;
+}
+
+Moments moments(const Sphere& sphere) {
+  const double r2 = sphere.radius * sphere.radius;
+  return {4.0 * kPi * r2, sphere.center, Eigen::Matrix3d::Identity() * (r2 / 3.0)};
+}
+
+Moments moments(const Disk& disk) {
+  return {kPi * disk.u.cross(disk.v).norm(), disk.center,
+          0.25 * (disk.u * disk.u.transpose() + disk.v * disk.v.transpose())};
+}
+
+ShapeExtent extent_of(const Geometry& geometry) {
+  const Moments m = std::visit([](const auto& shape) { return moments(shape); }, geometry);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(m.covariance);
+  const Vec3d variance = axes.eigenvalues().cwiseMax(0.0);
+  ShapeExtent extent;
+  extent.area = m.area;
+  extent.centroid = m.mean;
+  extent.radius = std::sqrt(variance.sum());
+  // Positions are floats: what is thinner than their rounding is flat.
+  const double thinnest = 1e-10 * variance.maxCoeff();
+  extent.planar = variance.x() <= thinnest;
+  for (int i = 0; i < 3; ++i)
+    if (variance[i] > thinnest)
+      extent.whitening.row(i) = axes.eigenvectors().col(i).transpose() / std::sqrt(variance[i]);
+  return extent;
+}
+
+DiscreteDistribution triangles_by_area(const TriangleMesh& mesh) {
+  std::vector<double> areas;
+  areas.reserve(mesh.triangles.size());
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    const std::array<Vec3d, 3> p = corners(mesh, i);
+    areas.push_back(0.5 * (p[1] - p[0]).cross(p[2] - p[0]).norm());
+  }
+  return DiscreteDistribution(areas);
+}
+
+bool uses_texture(const Bsdf& bsdf) {
+  struct Visitor {
+    bool operator()(const Diffuse& b) const { return !b.reflectance.is_constant(); }
+    bool operator()(const Conductor& b) const { return !b.specular_reflectance.is_constant(); }
+    bool operator()(const RoughConductor& b) const {
+      return !b.specular_reflectance.is_constant();
+    }
+    bool operator()(const Dielectric& b) const {
+      return !b.specular_reflectance.is_constant() || !b.specular_transmittance.is_constant();
+    }
+    bool operator()(const RoughDielectric& b) const {
+      return !b.specular_reflectance.is_constant() || !b.specular_transmittance.is_constant();
+    }
+    bool operator()(const Phong& b) const {
+      return !b.diffuse_reflectance.is_constant() || !b.specular_reflectance.is_constant();
+    }
+  };
+  return std::visit(Visitor{}, bsdf);
+}
+
+}  // namespace
+
+// ---- Scene ----------------------------------------------------------------------------------
+
+Scene::Scene() = default;
+Scene::~Scene() = default;
+Scene::Scene(Scene&&) noexcept = default;
+Scene& Scene::operator=(Scene&&) noexcept = default;
+
+Hit Scene::intersect(const Vec3d& origin, const Vec3d& direction, double t_min,
+                     double t_max) const {
+  RTCRayHit query{};
+  query.ray = embree_ray(origin, direction, t_min, t_max);
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(accelerator_->scene, &context, &query);
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
+  return {query.hit.geomID, query.hit.primID};
+}
+
+bool Scene::occluded(const Vec3d& a, const Vec3d& b) const {
+  const Vec3d d = b - a;
+  const double length = d.norm();
+  RTCRay ray = embree_ray(a, d / length, 0.0, length);
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded1(accelerator_->scene, &context, &ray);
+  return ray.tfar < 0.0F;
+}
+
+bool Scene::occluded_to_infinity(const Vec3d& origin, const Vec3d& direction) const {
+  RTCRay ray = embree_ray(origin, direction, 0.0, std::numeric_limits<double>::infinity());
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded1(accelerator_->scene, &context, &ray);
+  return ray.tfar < 0.0F;
+}
+
+Vec3d Scene::leave(const Vec3d& p, const Vec3d& n_g, const Vec3d& direction) const {
+  // Rounding to float moves a point by 6e-8 of its largest coordinate; Embree's plane equations
+  // lose a few bits more.
+  const double offset = 4e-6 * (p.cwiseAbs().maxCoeff() + 1e-2 * radius_);
+  return p + (n_g.dot(direction) > 0.0 ? offset : -offset) * n_g;
+}
+
+EmitterPoint Scene::sample_area(const AreaEmitter& emitter, double u1, double u2) const {
+  const Shape& shape = shapes_[emitter.shape];
+  if (const auto* sphere = std::get_if<Sphere>(&shape.geometry)) {
+    const Vec3d n = square_to_sphere(u1, u2);
+    return {sphere->center + sphere->radius * n, sphere->flip_normals ? Vec3d(-n) : n};
+  }
+  if (const auto* disk = std::get_if<Disk>(&shape.geometry)) {
+    const Vec2d s = square_to_disk(u1, u2);
+    return {disk->center + s.x() * disk->u + s.y() * disk->v,
+            disk->u.cross(disk->v).normalized()};
+  }
+  const auto& mesh = std::get<TriangleMesh>(shape.geometry);
+  const auto i = static_cast<std::uint32_t>(shape.triangles.sample(u1));
+  const std::array<Vec3d, 3> p = corners(mesh, i);
+  const double root = std::sqrt(u1);
+  const Vec3d point = p[0] + root * (1.0 - u2) * (p[1] - p[0]) + root * u2 * (p[2] - p[0]);
+  return {point, geometric_normal(mesh, i)};
+}
+
+// ---- SceneBuilder ---------------------------------------------------------------------------
+
+std::uint32_t SceneBuilder::add_bsdf(Bsdf bsdf) {
+  scene_.bsdfs_.push_back(std::move(bsdf));
+  return static_cast<std::uint32_t>(scene_.bsdfs_.size() - 1);
+}
+
+std::uint32_t SceneBuilder::add_material(const Material& material) {
+  scene_.materials_.push_back(material);
+  return static_cast<std::uint32_t>(scene_.materials_.size() - 1);
+}
+
+std::uint32_t SceneBuilder::add_shape(Geometry geometry, std::uint32_t material,
+                                      std::optional<Rgbd> radiance) {
+  if (const auto* mesh = std::get_if<TriangleMesh>(&geometry)) {
+    if (mesh->triangles.empty()) throw InputError("a mesh without triangles");
+    for (const auto& triangle : mesh->triangles)
+      for (const std::uint32_t i : triangle)
+        if (i >= mesh->positions.size())
+          throw InputError("a triangle's vertex index " + std::to_string(i) +
+                           " is beyond the mesh's " + std::to_string(mesh->positions.size()) +
+                           " vertices");
+  }
+  const auto index = static_cast<std::uint32_t>(scene_.shapes_.size());
+  Shape shape;
+  shape.geometry = std::move(geometry);
+  shape.material = material;
+  if (radiance) {
+    shape.emitter = static_cast<std::uint32_t>(scene_.emitters_.size());
+    scene_.emitters_.emplace_back(AreaEmitter{*radiance, index});
+  }
+  scene_.shapes_.push_back(std::move(shape));
+  return index;
+}
+
+void SceneBuilder::add_emitter(PointEmitter emitter) { scene_.emitters_.emplace_back(emitter); }
+
+void SceneBuilder::set_environment(Emitter environment) {
+  if (scene_.environment_) throw InputError("a scene can have one environment emitter only");
+  scene_.environment_ = static_cast<std::uint32_t>(scene_.emitters_.size());
+  scene_.emitters_.push_back(std::move(environment));
+}
+
+void SceneBuilder::set_camera(const PerspectiveCamera& camera) { scene_.camera_ = camera; }
+
+namespace {
+
+/// Power of an emitter up to a common factor; only the choice of emitters depends on it.
+double power(const Emitter& emitter, std::span<const Shape> shapes, double scene_radius) {
+  struct Visitor {
+    std::span<const Shape> shapes;
+    double disk;
+    double operator()(const AreaEmitter& e) const {
+      return luminance(e.radiance) * shapes[e.shape].extent.area * kPi;
+    }
+    double operator()(const PointEmitter& e) const { return luminance(e.intensity) * 4.0 * kPi; }
+    double operator()(const ConstantEnvironment& e) const {
+      return luminance(e.radiance) * 4.0 * kPi * disk;
+    }
+    double operator()(const EnvironmentMap& e) const { return e.total_luminance() * disk; }
+  };
+  return std::visit(Visitor{shapes, kPi * scene_radius * scene_radius}, emitter);
+}
+
+}  // namespace
+
+Scene SceneBuilder::build() {
+  Scene& scene = scene_;
+  if (scene.emitters_.empty()) throw InputError("the scene has no emitter");
+  Eigen::AlignedBox3d box;
+  for (Shape& shape : scene.shapes_) {
+    shape.extent = extent_of(shape.geometry);
+    const Material& material = scene.materials_.at(shape.material);
+    shape.textured = uses_texture(scene.bsdfs_.at(material.front)) ||
+                     (material.back && uses_texture(scene.bsdfs_.at(*material.back)));
+    if (shape.emitter)
+      if (const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry))
+        shape.triangles = triangles_by_area(*mesh);
+    box.extend(std::visit([](const auto& s) { return bounds_of(s); }, shape.geometry));
+  }
+  for (const Emitter& emitter : scene.emitters_)
+    if (const auto* point = std::get_if<PointEmitter>(&emitter)) box.extend(point->position);
+  if (!box.isEmpty()) {
+    scene.center_ = box.center();
+    scene.radius_ = 0.5 * box.diagonal().norm();
+  }
+  std::vector<double> powers;
+  for (const Emitter& emitter : scene.emitters_)
+    powers.push_back(power(emitter, scene.shapes_, scene.radius_));
+  scene.emitter_choice_ = DiscreteDistribution(powers);
+  if (!(scene.emitter_choice_.total() > 0.0)) throw InputError("all emitters of the scene are black");
+
+  // User geometries point into shapes_, which does not move from here on.
+  scene.accelerator_ = std::make_unique<Scene::Accelerator>();
+  for (const Shape& shape : scene.shapes_) {
+    RTCGeometry geometry = std::visit(
+        [&](const auto& s) { return embree_geometry(scene.accelerator_->device, s); },
+        shape.geometry);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene.accelerator_->scene, geometry);
+    rtcReleaseGeometry(geometry);
+  }
+  rtcCommitScene(scene.accelerator_->scene);
+  if (rtcGetDeviceError(scene.accelerator_->device) != RTC_ERROR_NONE)
+    throw RuntimeError("Embree could not build the scene");
+  return std::move(scene_);
+}
+
+}  // namespace driftlight

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bsdfs_xml.h"
+
+#include <algorithm>
+#include <array>
+#include <span>
+
+#include "properties.h"
+#include "refractive_indices.h"
+#include "text.h"
+#include "textures_xml.h"
+
+namespace driftlight {
+namespace {
+
+const Rgbd kWhite{1, 1, 1};
+
+/// Mitsuba's remedy for materials that reflect more than they receive: textures that act together
+/// are scaled so that their maxima sum to 0.99, unless ensureEnergyConservation is false.
+void conserve_energy(Properties& properties, LoadContext& context,
+                     std::initializer_list<Texture*> textures) {
+  if (!properties.boolean("ensureEnergyConservation", true)) return;
+  Rgbd sum = Rgbd::Zero();
+  for (const Texture* texture : textures) sum += maximum_color(*texture);
+  if (sum.maxCoeff() <= 1.0) return;
+  const double factor = 0.99 / sum.maxCoeff();
+  for (Texture* texture : textures) scale(*texture, factor);
+  context.notice(properties.element(), "the reflectance of " + properties.description() +
+                                           " exceeds 1 and is scaled by " +
+                                           std::to_string(factor) + ", as in Mitsuba");
+}
+
+/// Reads a texture that acts alone.
+Texture read_scattering(Properties& properties, LoadContext& context, std::string_view name,
+                        const Rgbd& fallback) {
+  Texture texture = read_textured(properties, name, fallback, context);
+  conserve_energy(properties, context, {&texture});
+  return texture;
+}
+
+double read_alpha(Properties& properties, LoadContext& context) {
+  constexpr double kLeast = 1e-4;
+  const bool by_axis = properties.has("alphaU") || properties.has("alphaV");
+  if (by_axis && properties.has("alpha"))
+    properties.fail("alpha", "give either 'alpha' or 'alphaU' and 'alphaV'");
+  if (by_axis && !(properties.has("alphaU") && properties.has("alphaV")))
+    properties.element().fail("'alphaU' and 'alphaV' need each other");
+  const double alpha = properties.non_negative(by_axis ? "alphaU" : "alpha", 0.1);
+  if (by_axis && properties.number("alphaV", alpha) != alpha)
+    properties.fail("alphaV", "must equal 'alphaU': only isotropic roughness is supported");
+  if (alpha < kLeast)
+    context.notice(properties.element(), "roughness is raised to 0.0001, as in Mitsuba");
+  return std::max(alpha, kLeast);
+}
+
+Microfacets read_microfacets(Properties& properties, LoadContext& context) {
+  const std::string name = properties.choice("distribution", "beckmann", {"beckmann", "ggx"});
+  properties.ignore({"sampleVisible"});
+  return {name == "ggx" ? Distribution::Ggx : Distribution::Beckmann,
+          read_alpha(properties, context)};
+}
+
+Bsdf read_diffuse(Properties& properties, LoadContext& context) {
+  const bool long_name = properties.has("diffuseReflectance") && !properties.has("reflectance");
+  return Diffuse{read_scattering(properties, context,
+                                 long_name ? "diffuseReflectance" : "reflectance",
+                                 Rgbd::Constant(0.5))};
+}
+
+/// eta and k of a metal: by name, where given by value, over the index outside.
+void read_metal(Properties& properties, LoadContext& context, Rgbd& eta, Rgbd& k) {
+  const std::string name = properties.text("material").value_or("Cu");
+  eta = Rgbd::Zero();
+  k = Rgbd::Ones();
+  if (lower_case(name) != "none") {
+    const MetalIndex metal = find_metal(properties, name);
+    eta = metal.eta;
+    k = metal.k;
+    if (!properties.has("eta") || !properties.has("k"))
+      context.notice(properties.element(), "metal '" + name + "' as measured by " + metal.source +
+                                               "; Mitsuba's own table may differ a little");
+  }
+  const double outside = read_index(properties, "extEta", "air");
+  eta = properties.color("eta", eta) / outside;
+  k = properties.color("k", k) / outside;
+}
+
+Bsdf read_conductor(Properties& properties, LoadContext& context) {
+  Conductor bsdf;
+  read_metal(properties, context, bsdf.eta, bsdf.k);
+  bsdf.specular_reflectance =
+      read_scattering(properties, context, "specularReflectance", kWhite);
+  return bsdf;
+}
+
+Bsdf read_rough_conductor(Properties& properties, LoadContext& context) {
+  RoughConductor bsdf;
+  bsdf.microfacets = read_microfacets(properties, context);
+  read_metal(properties, context, bsdf.eta, bsdf.k);
+  bsdf.specular_reflectance =
+      read_scattering(properties, context, "specularReflectance", kWhite);
+  return bsdf;
+}
+
+/// Fills in what smooth and rough dielectrics have in common.
+template <class D>
+D read_interface(Properties& properties, LoadContext& context) {
+  D bsdf;
+  bsdf.eta = read_index(properties, "intIOR", "bk7") / read_index(properties, "extIOR", "air");
+  bsdf.specular_reflectance =
+      read_scattering(properties, context, "specularReflectance", kWhite);
+  bsdf.specular_transmittance =
+      read_scattering(properties, context, "specularTransmittance", kWhite);
+  return bsdf;
+}
+
+Bsdf read_dielectric(Properties& properties, LoadContext& context) {
+  return read_interface<Dielectric>(properties, context);
+}
+
+Bsdf read_rough_dielectric(Properties& properties, LoadContext& context) {
+  auto bsdf = read_interface<RoughDielectric>(properties, context);
+  bsdf.microfacets = read_microfacets(properties, context);
+  if (bsdf.eta == 1.0)
+    properties.element().fail("'intIOR' and 'extIOR' of a roughdielectric must differ");
+  return bsdf;
+}
+
+Bsdf read_phong(Properties& properties, LoadContext& context) {
+  Phong bsdf;
+  bsdf.diffuse_reflectance =
+      read_textured(properties, "diffuseReflectance", Rgbd::Constant(0.5), context);
+  bsdf.specular_reflectance =
+      read_textured(properties, "specularReflectance", Rgbd::Constant(0.2), context);
+  bsdf.exponent = properties.non_negative("exponent", 30.0);
+  conserve_energy(properties, context, {&bsdf.diffuse_reflectance, &bsdf.specular_reflectance});
+  return bsdf;
+}
+
+Surface read_two_sided(Properties& properties, LoadContext& context) {
+  const std::vector<Element> nested = properties.nested({"bsdf", "ref"});
+  if (nested.empty() || nested.size() > 2)
+    properties.element().fail("a twosided bsdf needs one or two nested bsdfs");
+  std::vector<Bsdf> sides;
+  for (const Element& element : nested) {
+    const std::shared_ptr<Surface> side = read_surface(element, context);
+    if (side->back || is_transmissive(side->front))
+      element.fail("only a one-sided bsdf without transmission can be nested in twosided");
+    sides.push_back(side->front);
+  }
+  properties.ignore({"ensureEnergyConservation"});
+  return {sides.front(), sides.back(), std::nullopt};
+}
+
+template <Bsdf (*Read)(Properties&, LoadContext&)>
+Surface one_sided(Properties& properties, LoadContext& context) {
+  return {Read(properties, context), std::nullopt, std::nullopt};
+}
+
+using Reader = Surface (*)(Properties&, LoadContext&);
+constexpr std::array<std::pair<std::string_view, Reader>, 7> kBsdfs{{
+    {"diffuse", &one_sided<read_diffuse>},
+    {"conductor", &one_sided<read_conductor>},
+    {"roughconductor", &one_sided<read_rough_conductor>},
+    {"dielectric", &one_sided<read_dielectric>},
+    {"roughdielectric", &one_sided<read_rough_dielectric>},
+    {"phong", &one_sided<read_phong>},
+    {"twosided", &read_two_sided},
+}};
+
+bool has_bitmap(const Diffuse& b) { return !b.reflectance.is_constant(); }
+bool has_bitmap(const Conductor& b) { return !b.specular_reflectance.is_constant(); }
+bool has_bitmap(const RoughConductor& b) { return !b.specular_reflectance.is_constant(); }
+bool has_bitmap(const Phong& b) {
+  return !b.diffuse_reflectance.is_constant() || !b.specular_reflectance.is_constant();
+}
+template <class D>
+bool has_bitmap(const D& dielectric) {
+  return !dielectric.specular_reflectance.is_constant() ||
+         !dielectric.specular_transmittance.is_constant();
+}
+
+bool has_bitmap(const Bsdf& bsdf) {
+  return std::visit([](const auto& b) { return has_bitmap(b); }, bsdf);
+}
+
+}  // namespace
+
+std::shared_ptr<Surface> read_surface(const Element& element, LoadContext& context) {
+  if (element.tag() == "ref")
+    return context.objects.resolve<std::shared_ptr<Surface>>(element, "bsdf");
+  Properties properties(element);
+  auto surface = std::make_shared<Surface>(find_plugin(kBsdfs, properties)(properties, context));
+  properties.finish();
+  context.objects.define(element, surface);
+  return surface;
+}
+
+std::uint32_t material_index(Surface& surface, LoadContext& context) {
+  if (!surface.material) {
+    Material material{context.builder.add_bsdf(surface.front), std::nullopt};
+    if (surface.back) material.back = context.builder.add_bsdf(*surface.back);
+    surface.material = context.builder.add_material(material);
+  }
+  return *surface.material;
+}
+
+bool is_textured(const Surface& surface) {
+  return has_bitmap(surface.front) || (surface.back && has_bitmap(*surface.back));
+}
+
+}  // namespace driftlight

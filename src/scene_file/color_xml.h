@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Colours of scene files.
+#pragma once
+
+#include "driftlight/scalar.h"
+#include "xml_document.h"
+
+namespace driftlight {
+
+/// Linear sRGB of <rgb>, <srgb> (one value, three values or #rrggbb) or <spectrum> (one value, three
+/// values, or a list "wavelength:value, ..", nm). Throws SceneError on negative values.
+Rgbd read_color(const Element& element);
+
+}  // namespace driftlight

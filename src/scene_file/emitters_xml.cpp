@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emitters_xml.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "properties.h"
+#include "textures_xml.h"
+
+namespace driftlight {
+namespace {
+
+const Rgbd kWhite{1, 1, 1};
+
+void read_point(Properties& properties, LoadContext& context) {
+  const std::optional<Vec3d> position = properties.point("position");
+  if (position && properties.has("toWorld"))
+    properties.fail("toWorld", "give either 'position' or 'toWorld'");
+  const Vec3d origin = properties.transform("toWorld").translation();
+  const PointEmitter emitter{position.value_or(origin), properties.color("intensity", kWhite)};
+  if (emitter.intensity.maxCoeff() > 0.0) context.builder.add_emitter(emitter);
+}
+
+void read_constant(Properties& properties, LoadContext& context) {
+  properties.transform("toWorld");  // turning a constant changes nothing
+  const ConstantEnvironment emitter{properties.color("radiance", kWhite)};
+  if (emitter.radiance.maxCoeff() > 0.0)
+    with_location(properties.element(), [&] { context.builder.set_environment(emitter); });
+}
+
+/// The rotation (or mirror rotation) in a transform that may also scale evenly: neither a scale nor
+/// a shift means anything for an environment.
+Eigen::Matrix3d read_rotation(Properties& properties) {
+  const Eigen::Matrix3d linear = properties.transform("toWorld").linear();
+  const Eigen::Matrix3d rotation = linear / std::cbrt(std::abs(linear.determinant()));
+  if (!(rotation * rotation.transpose()).isIdentity(1e-3))
+    properties.fail("toWorld", "the transform of an envmap must be a rotation");
+  return rotation;
+}
+
+void read_environment_map(Properties& properties, LoadContext& context) {
+  const std::string file = properties.required_text("filename");
+  const std::optional<Gamma> gamma = read_gamma(properties);
+  const double scale = properties.non_negative("scale", 1.0);
+  const Eigen::Matrix3d to_world = read_rotation(properties);
+  properties.ignore({"cache"});
+  with_location(properties.element(), [&] {
+    Bitmap bitmap = read_image(context.directory / file, gamma);
+    const bool black = std::all_of(bitmap.texels.begin(), bitmap.texels.end(),
+                                   [](const auto& texel) { return (texel == 0.0F).all(); });
+    if (black || scale == 0.0) throw InputError("the environment map is black");
+    context.builder.set_environment(EnvironmentMap(std::move(bitmap), to_world, scale));
+  });
+}
+
+void reject_area(Properties& properties, LoadContext&) {
+  properties.element().fail("an area emitter must be inside of a shape");
+}
+
+using Reader = void (*)(Properties&, LoadContext&);
+constexpr std::array<std::pair<std::string_view, Reader>, 4> kEmitters{{
+    {"point", &read_point},
+    {"constant", &read_constant},
+    {"envmap", &read_environment_map},
+    {"area", &reject_area},
+}};
+
+}  // namespace
+
+void read_emitter(const Element& element, LoadContext& context) {
+  Properties properties(element);
+  find_plugin(kEmitters, properties)(properties, context);
+  properties.ignore({"samplingWeight"});
+  properties.finish();
+  context.objects.define(element, NamedObjects::Other{});
+}
+
+Rgbd read_area_radiance(const Element& element, LoadContext& context) {
+  Properties properties(element);
+  if (properties.type() != "area")
+    element.fail("unknown " + properties.description() + " in a shape; valid are: area");
+  const Rgbd radiance = properties.color("radiance", kWhite);
+  properties.ignore({"samplingWeight"});
+  properties.finish();
+  context.objects.define(element, NamedObjects::Other{});
+  return radiance;
+}
+
+}  // namespace driftlight

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Emitters of scene files.
+#pragma once
+
+#include "load_context.h"
+
+namespace driftlight {
+
+/// An <emitter> outside of shapes: point, constant or envmap. Black ones are left out.
+void read_emitter(const Element& element, LoadContext& context);
+
+/// Radiance of an <emitter type="area"> inside of a shape.
+Rgbd read_area_radiance(const Element& element, LoadContext& context);
+
+}  // namespace driftlight

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <memory>
+
+#include "bsdfs_xml.h"
+#include "driftlight/scene_file.h"
+#include "emitters_xml.h"
+#include "load_context.h"
+#include "properties.h"
+#include "sensor_xml.h"
+#include "shapes_xml.h"
+#include "text.h"
+#include "textures_xml.h"
+
+namespace driftlight {
+namespace {
+
+/// Elements that Mitsuba knows but we do not: they would change the picture.
+constexpr std::array kUnsupported{"subsurface", "medium", "volume",  "phase",    "alias",
+                                  "animation",  "film",   "sampler", "rfilter",  "ref",
+                                  "boolean",    "float",  "integer", "string",   "rgb",
+                                  "spectrum",   "point",  "vector",  "transform"};
+
+/// Reads one scene: the elements of its file, from top to bottom, into a SceneBuilder.
+class SceneLoader {
+ public:
+  SceneLoader(const std::filesystem::path& file, const LoadOptions& options)
+      : file_(file),
+        context_{file.parent_path(), Substitutions(options.defines), {}, {}, {}} {}
+
+  LoadedScene load() {
+    const Element root = read_file(file_);
+    context_.substitutions.check_defines_used(file_);
+    if (!has_sensor_) root.fail("the scene has no sensor");
+    if (!has_shape_) root.fail("the scene has no shape");
+    if (!has_emitter_) root.fail("the scene has no emitter");
+    Scene scene = with_location(root, [&] { return context_.builder.build(); });
+    return {std::move(scene), max_depth_, std::move(context_.notices)};
+  }
+
+ private:
+  /// Reads all elements of a file, which stays in memory as long as the loader lives. Returns its
+  /// outermost element.
+  Element read_file(const std::filesystem::path& file) {
+    documents_.push_back(std::make_unique<XmlDocument>(file));
+    const XmlDocument& document = *documents_.back();
+    const Element scene(document, document.root(), context_.substitutions);
+    if (scene.tag() != "scene") scene.fail("the outermost element must be <scene>");
+    scene.allow_attributes({"version", "id"});
+    const std::string version = scene.text("version");
+    if (!version.starts_with("0.5.") && !version.starts_with("0.6."))
+      scene.fail("scene version '" + version + "' is not supported; valid are: 0.5.x, 0.6.x");
+    open_files_.push_back(file);
+    for (const Element& element : scene.children()) read(element);
+    open_files_.pop_back();
+    return scene;
+  }
+
+  void read(const Element& element) {
+    const std::string tag = element.tag();
+    if (tag == "default") {
+      read_default(element);
+    } else if (tag == "include") {
+      read_include(element);
+    } else if (tag == "integrator") {
+      read_integrator(element);
+    } else if (tag == "sensor") {
+      read_the_sensor(element);
+    } else if (tag == "bsdf") {
+      read_surface(element, context_);
+    } else if (tag == "texture") {
+      read_texture(element, context_);
+    } else if (tag == "emitter") {
+      read_emitter(element, context_);
+      has_emitter_ = true;
+    } else if (tag == "shape") {
+      read_shape(element, context_);
+      has_shape_ = true;
+      has_emitter_ |= contains(element, "emitter");
+    } else {
+      read_other(element);
+    }
+  }
+
+  static bool contains(const Element& element, std::string_view tag) {
+    const std::vector<Element> children = element.children();
+    return std::any_of(children.begin(), children.end(),
+                       [&](const Element& child) { return child.tag() == tag; });
+  }
+
+  void read_default(const Element& element) {
+    element.allow_attributes({"name", "value"});
+    const std::string name = element.text("name");
+    if (name.empty()) element.fail("<default> needs a name");
+    context_.substitutions.add_default(name, element.text("value"));
+  }
+
+  /// Reads another file as if its elements stood here.
+  void read_include(const Element& element) {
+    element.allow_attributes({"filename"});
+    const std::filesystem::path file = context_.directory / element.text("filename");
+    if (!std::filesystem::exists(file))
+      element.fail("the file '" + file.string() + "' does not exist");
+    const bool cyclic =
+        std::any_of(open_files_.begin(), open_files_.end(),
+                    [&](const auto& other) { return std::filesystem::equivalent(file, other); });
+    if (cyclic) element.fail("cyclic include: '" + file.string() + "' includes itself");
+    read_file(file);
+  }
+
+  void read_the_sensor(const Element& element) {
+    if (has_sensor_) element.fail("a second sensor");
+    context_.builder.set_camera(read_sensor(element, context_));
+    has_sensor_ = true;
+  }
+
+  void read_integrator(const Element& element) {
+    Properties properties(element);
+    if (properties.type() != "langevin" && properties.type() != "path")
+      context_.notice(element, properties.description() +
+                                   " is not driftlight's; only its maxDepth is used");
+    if (properties.boolean("hideEmitters", false))
+      properties.fail("hideEmitters", "hiding emitters is not supported");
+    if (const auto depth = properties.find("maxDepth")) set_max_depth(*depth);
+    context_.objects.define(element, NamedObjects::Other{});
+  }
+
+  /// A block of some other program, which may hold the depth of its integrator.
+  void read_other(const Element& element) {
+    const std::string tag = element.tag();
+    if (std::find(kUnsupported.begin(), kUnsupported.end(), tag) != kUnsupported.end())
+      element.fail("<" + tag + "> is not supported in a scene; valid are: default, include, "
+                   "integrator, sensor, bsdf, texture, emitter, shape");
+    context_.notice(element, "block <" + tag + "> is not ours; only its maxDepth is used");
+    for (const Element& child : element.children())
+      if (lower_case(child.find("name").value_or("")) == "maxdepth") set_max_depth(child);
+  }
+
+  /// From an <integer>. Mitsuba counts edges, as we do; -1 is without bound.
+  void set_max_depth(const Element& element) {
+    const std::optional<int> depth = parse_integer(element.text("value"));
+    if (!depth || *depth == 0 || *depth < -1)
+      element.fail("the depth must be a positive integer, or -1 for no bound");
+    max_depth_ = *depth == -1 ? std::nullopt : depth;
+  }
+
+  std::filesystem::path file_;
+  std::vector<std::unique_ptr<XmlDocument>> documents_;
+  std::vector<std::filesystem::path> open_files_;  ///< the outermost first
+  LoadContext context_;
+  std::optional<int> max_depth_;
+  bool has_sensor_ = false;
+  bool has_shape_ = false;
+  bool has_emitter_ = false;
+};
+
+}  // namespace
+
+LoadedScene load_scene(const std::filesystem::path& file, const LoadOptions& options) {
+  return SceneLoader(file, options).load();
+}
+
+}  // namespace driftlight

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mesh_serialized.h"
+
+#include <zlib.h>
+
+#include <bit>
+#include <cstring>
+#include <fstream>
+#include <string>
+
+#include "driftlight/error.h"
+#include "mesh.h"
+
+// A .serialized file is a sequence of meshes, then the offsets of them all (64 bits each, 32 in
+// version 3), then their number (32 bits). A mesh is the 16-bit numbers 0x041C and the version,
+// followed by a zlib stream of: flags (32 bits), in version 4 a name that ends with a zero, the
+// numbers of vertices and of triangles (64 bits each), positions, normals, texture coordinates and
+// colours as the flags say, and three 32-bit indices a triangle. All is little-endian.
+
+namespace driftlight {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "the reader copies bytes as they are");
+
+constexpr std::uint16_t kMagic = 0x041C;
+
+enum Flags : std::uint32_t {
+  kHasNormals = 0x0001,
+  kHasTexCoords = 0x0002,
+  kHasColors = 0x0008,
+  kDoublePrecision = 0x2000,
+};
+
+/// The bytes of a file, read at any place.
+class BinaryFile {
+ public:
+  explicit BinaryFile(const std::filesystem::path& file) : stream_(file, std::ios::binary) {
+    if (!stream_ || std::filesystem::is_directory(file)) throw InputError("it cannot be opened");
+    size_ = std::filesystem::file_size(file);
+  }
+
+  std::uint64_t size() const { return size_; }
+
+  std::string bytes(std::uint64_t offset, std::uint64_t count) {
+    if (offset > size_ || count > size_ - offset) throw InputError("it is truncated");
+    std::string result(count, '\0');
+    stream_.seekg(static_cast<std::streamoff>(offset));
+    if (!stream_.read(result.data(), static_cast<std::streamsize>(count)))
+      throw InputError("it cannot be read");
+    return result;
+  }
+
+  template <class T>
+  T number(std::uint64_t offset) {
+    T result;
+    std::memcpy(&result, bytes(offset, sizeof(T)).data(), sizeof(T));
+    return result;
+  }
+
+ private:
+  std::ifstream stream_;
+  std::uint64_t size_ = 0;
+};
+
+/// Decompresses a zlib stream piece by piece.
+class InflateStream {
+ public:
+  explicit InflateStream(std::string compressed) : compressed_(std::move(compressed)) {
+    stream_.next_in = reinterpret_cast<Bytef*>(compressed_.data());
+    stream_.avail_in = static_cast<uInt>(compressed_.size());
+    if (inflateInit(&stream_) != Z_OK) throw RuntimeError("zlib cannot be initialised");
+  }
+  ~InflateStream() { inflateEnd(&stream_); }
+  InflateStream(const InflateStream&) = delete;
+  InflateStream& operator=(const InflateStream&) = delete;
+
+  /// Throws InputError unless `count` elements of `size` bytes can be in the stream. It bounds what
+  /// a corrupt header can make us allocate: deflate never expands more than 1032 times.
+  void expect(std::uint64_t count, std::uint64_t size) const {
+    if (count > 1032 * static_cast<std::uint64_t>(compressed_.size()) / size)
+      throw InputError("it is corrupt: it says that it has " + std::to_string(count) +
+                       " elements, which is more than its size allows");
+  }
+
+  void read(void* target, std::size_t size) {
+    stream_.next_out = static_cast<Bytef*>(target);
+    while (size > 0) {
+      const auto piece = static_cast<uInt>(std::min<std::size_t>(size, 1U << 30U));
+      stream_.avail_out = piece;
+      const int status = inflate(&stream_, Z_NO_FLUSH);
+      size -= piece - stream_.avail_out;
+      if (size > 0 && status != Z_OK)
+        throw InputError(status == Z_DATA_ERROR ? "its compressed data is corrupt"
+                                                : "it is truncated");
+    }
+  }
+
+  template <class T>
+  T number() {
+    T result;
+    read(&result, sizeof(T));
+    return result;
+  }
+
+ private:
+  std::string compressed_;
+  z_stream stream_{};
+};
+
+template <class File, int N>
+std::vector<Eigen::Matrix<float, N, 1>> read_vectors(InflateStream& stream, std::size_t count) {
+  stream.expect(count, N * sizeof(File));
+  std::vector<Eigen::Matrix<File, N, 1>> values(count);
+  stream.read(values.data(), count * N * sizeof(File));
+  std::vector<Eigen::Matrix<float, N, 1>> result;
+  result.reserve(count);
+  for (const auto& value : values) result.push_back(value.template cast<float>());
+  return result;
+}
+
+template <class File>
+void read_vertices(InflateStream& stream, std::uint32_t flags, std::size_t count,
+                   TriangleMesh& mesh) {
+  mesh.positions = read_vectors<File, 3>(stream, count);
+  if (flags & kHasNormals) mesh.normals = read_vectors<File, 3>(stream, count);
+  if (flags & kHasTexCoords) mesh.uvs = read_vectors<File, 2>(stream, count);
+  if (flags & kHasColors) read_vectors<File, 3>(stream, count);
+}
+
+TriangleMesh read_mesh(InflateStream& stream, std::uint16_t version) {
+  const auto flags = stream.number<std::uint32_t>();
+  if (version == 4)
+    while (stream.number<char>() != '\0') continue;  // the name
+  const auto vertices = stream.number<std::uint64_t>();
+  const auto triangles = stream.number<std::uint64_t>();
+  TriangleMesh mesh;
+  if (flags & kDoublePrecision)
+    read_vertices<double>(stream, flags, vertices, mesh);
+  else
+    read_vertices<float>(stream, flags, vertices, mesh);
+  stream.expect(triangles, sizeof(mesh.triangles[0]));
+  mesh.triangles.resize(triangles);
+  stream.read(mesh.triangles.data(), triangles * sizeof(mesh.triangles[0]));
+  check_mesh(mesh);
+  return mesh;
+}
+
+/// Where mesh `index` begins. The first needs no table of offsets, and may have none.
+std::uint64_t find_mesh(BinaryFile& file, std::uint16_t version, std::uint64_t index) {
+  if (index == 0) return 0;
+  constexpr std::uint64_t kCountSize = sizeof(std::uint32_t);
+  const std::uint64_t offset_size = version == 4 ? 8 : 4;
+  const auto count = file.number<std::uint32_t>(file.size() - kCountSize);
+  if (index >= count)
+    throw InputError("it has no mesh " + std::to_string(index) + ": it says that it has " +
+                     std::to_string(count));
+  const std::uint64_t table_size = kCountSize + count * offset_size;
+  if (table_size > file.size()) throw InputError("it is truncated");
+  const std::uint64_t entry = file.size() - table_size + index * offset_size;
+  return version == 4 ? file.number<std::uint64_t>(entry) : file.number<std::uint32_t>(entry);
+}
+
+std::uint16_t read_version(BinaryFile& file, std::uint64_t offset) {
+  if (file.number<std::uint16_t>(offset) != kMagic) throw InputError("it has no mesh header");
+  const auto version = file.number<std::uint16_t>(offset + 2);
+  if (version != 3 && version != 4)
+    throw InputError("its version " + std::to_string(version) + " is not 3 or 4");
+  return version;
+}
+
+}  // namespace
+
+TriangleMesh read_serialized(const std::filesystem::path& path, int shape_index) {
+  try {
+    if (shape_index < 0) throw InputError("a shapeIndex must not be negative");
+    BinaryFile file(path);
+    const auto index = static_cast<std::uint64_t>(shape_index);
+    const std::uint64_t offset = find_mesh(file, read_version(file, 0), index);
+    const std::uint16_t version = read_version(file, offset);
+    InflateStream stream(file.bytes(offset + 4, file.size() - offset - 4));
+    return read_mesh(stream, version);
+  } catch (const InputError& error) {
+    throw InputError("the mesh file '" + path.string() + "' is not usable: " + error.what());
+  }
+}
+
+}  // namespace driftlight

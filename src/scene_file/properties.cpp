@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "properties.h"
+
+#include <algorithm>
+
+#include "color_xml.h"
+#include "text.h"
+#include "transform_xml.h"
+
+namespace driftlight {
+
+Properties::Properties(const Element& element)
+    : element_(element), type_(lower_case(element.find("type").value_or(""))) {
+  element.allow_attributes({"type", "id", "name"});
+  for (const Element& child : element.children()) {
+    const std::string name = child.find("name").value_or("");
+    const bool seen = !name.empty() && std::any_of(children_.begin(), children_.end(),
+                                                   [&](const Child& c) { return c.name == name; });
+    if (seen) child.fail("'" + name + "' is given twice in " + description());
+    children_.push_back({child, name});
+  }
+}
+
+std::string Properties::description() const {
+  return type_.empty() ? element_.tag() : element_.tag() + " '" + type_ + "'";
+}
+
+std::optional<Element> Properties::find(std::string_view name) {
+  if (std::find(names_.begin(), names_.end(), name) == names_.end()) names_.emplace_back(name);
+  for (Child& child : children_) {
+    if (child.name != name) continue;
+    child.used = true;
+    return child.element;
+  }
+  return std::nullopt;
+}
+
+std::optional<Element> Properties::find(std::string_view name,
+                                        const std::vector<std::string>& tags) {
+  const std::optional<Element> child = find(name);
+  if (child && std::find(tags.begin(), tags.end(), child->tag()) == tags.end())
+    child->fail("'" + std::string(name) + "' of " + description() + " must be <" + tags.front() +
+                ">, not <" + child->tag() + ">");
+  return child;
+}
+
+std::vector<Element> Properties::nested(std::initializer_list<std::string_view> tags) {
+  std::vector<Element> result;
+  for (Child& child : children_) {
+    if (child.used || std::find(tags.begin(), tags.end(), child.element.tag()) == tags.end())
+      continue;
+    child.used = true;
+    result.push_back(child.element);
+  }
+  return result;
+}
+
+void Properties::ignore(std::initializer_list<std::string_view> names) {
+  for (const std::string_view name : names) find(name);
+}
+
+double Properties::number(std::string_view name, double fallback) {
+  const auto child = find(name, {"float", "integer"});
+  if (!child) return fallback;
+  child->allow_attributes({"name", "value"});
+  return child->number("value");
+}
+
+double Properties::positive(std::string_view name, double fallback) {
+  const double result = number(name, fallback);
+  if (!(result > 0.0)) fail(name, "must be positive");
+  return result;
+}
+
+double Properties::non_negative(std::string_view name, double fallback) {
+  const double result = number(name, fallback);
+  if (!(result >= 0.0)) fail(name, "must not be negative");
+  return result;
+}
+
+int Properties::integer(std::string_view name, int fallback) {
+  const auto child = find(name, {"integer"});
+  if (!child) return fallback;
+  child->allow_attributes({"name", "value"});
+  const std::string value = child->text("value");
+  if (const auto parsed = parse_integer(value)) return *parsed;
+  child->fail("'" + value + "' is not an integer in range");
+}
+
+bool Properties::boolean(std::string_view name, bool fallback) {
+  const auto child = find(name, {"boolean"});
+  if (!child) return fallback;
+  child->allow_attributes({"name", "value"});
+  const std::string value = child->text("value");
+  if (value != "true" && value != "false") child->fail("'" + value + "' is not true or false");
+  return value == "true";
+}
+
+std::optional<std::string> Properties::text(std::string_view name) {
+  const auto child = find(name, {"string"});
+  if (!child) return std::nullopt;
+  child->allow_attributes({"name", "value"});
+  return child->text("value");
+}
+
+std::string Properties::required_text(std::string_view name) {
+  if (auto value = text(name)) return *std::move(value);
+  element_.fail(description() + " lacks the <string> '" + std::string(name) + "'");
+}
+
+std::string Properties::choice(std::string_view name, const std::string& fallback,
+                               const std::vector<std::string>& valid) {
+  const std::string value = lower_case(text(name).value_or(fallback));
+  if (std::find(valid.begin(), valid.end(), value) == valid.end())
+    fail(name, "'" + value + "' is not supported; valid are: " + join(valid));
+  return value;
+}
+
+Rgbd Properties::color(std::string_view name, const Rgbd& fallback) {
+  const auto child = find(name, {"rgb", "srgb", "spectrum"});
+  return child ? read_color(*child) : fallback;
+}
+
+std::optional<Vec3d> Properties::point(std::string_view name) {
+  const auto child = find(name, {"point"});
+  if (!child) return std::nullopt;
+  child->allow_attributes({"name", "x", "y", "z"});
+  return Vec3d(child->number("x"), child->number("y"), child->number("z"));
+}
+
+Eigen::Affine3d Properties::transform(std::string_view name) {
+  const auto child = find(name, {"transform"});
+  return child ? read_transform(*child) : Eigen::Affine3d::Identity();
+}
+
+void Properties::finish() const {
+  for (const Child& child : children_) {
+    if (child.used) continue;
+    if (child.name.empty())
+      child.element.fail("<" + child.element.tag() + "> is not supported in " + description());
+    child.element.fail("unknown property '" + child.name + "' of " + description() +
+                       "; valid are: " + (names_.empty() ? "none" : join(names_)));
+  }
+}
+
+void Properties::fail(std::string_view name, const std::string& message) {
+  find(name).value_or(element_).fail("'" + std::string(name) + "' of " + description() + ": " +
+                                     message);
+}
+
+}  // namespace driftlight

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Spectra given as lists, and their colours.
+#pragma once
+
+#include <vector>
+
+#include "driftlight/scalar.h"
+
+namespace driftlight {
+
+struct SpectrumSample {
+  double wavelength = 0;  ///< nm
+  double value = 0;
+};
+
+/// Linear between the samples (at least two, by growing wavelength), zero outside of them.
+using Spectrum = std::vector<SpectrumSample>;
+
+/// The spectrum with a ramp at each end that is not zero: down to zero over the mean spacing of the
+/// samples, which is how Mitsuba continues lists in scene files.
+Spectrum ramp_to_zero(Spectrum spectrum);
+
+/// Linear sRGB of a spectrum, as a Mitsuba of three channels sees it: XYZ = integral of the spectrum
+/// times the CIE 1931 matching functions over the integral of y, exact for the piecewise linear
+/// tables. Equal energy 1 gives (1.2048, 0.9483, 0.9087), not white. Colours outside of the
+/// gamut are clamped to it, at zero.
+Rgbd spectrum_to_rgb(const Spectrum& spectrum);
+
+/// The inverse of the sRGB transfer curve, for values from 0 to 1.
+double srgb_to_linear(double encoded);
+
+}  // namespace driftlight

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "substitutions.h"
+
+#include "text.h"
+
+namespace driftlight {
+namespace {
+
+/// The identifier that the text begins with, for messages.
+std::string_view leading_identifier(std::string_view text) {
+  const auto is_identifier = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+  };
+  std::size_t length = 0;
+  while (length < text.size() && is_identifier(text[length])) ++length;
+  return text.substr(0, length);
+}
+
+std::vector<std::string> keys(const std::map<std::string, std::string>& values) {
+  std::vector<std::string> names;
+  for (const auto& [name, value] : values) names.push_back(name);
+  return names;
+}
+
+}  // namespace
+
+Substitutions::Substitutions(std::map<std::string, std::string> defines)
+    : values_(std::move(defines)) {
+  for (const auto& [name, value] : values_) unused_defines_.insert(name);
+}
+
+void Substitutions::add_default(const std::string& name, const std::string& value) {
+  values_.try_emplace(name, value);
+  unused_defines_.erase(name);
+}
+
+const std::string* Substitutions::longest_name(std::string_view text) const {
+  const std::string* best = nullptr;
+  for (const auto& [name, value] : values_) {
+    const bool fits = !name.empty() && text.substr(0, name.size()) == name;
+    if (fits && (!best || name.size() > best->size())) best = &name;
+  }
+  return best;
+}
+
+std::string Substitutions::apply(const std::string& text) {
+  std::string result;
+  std::size_t done = 0;
+  for (auto dollar = text.find('$'); dollar != std::string::npos; dollar = text.find('$', done)) {
+    const std::string_view rest = std::string_view(text).substr(dollar + 1);
+    const std::string* const name = longest_name(rest);
+    if (!name)
+      throw InputError("'$" + std::string(leading_identifier(rest)) +
+                       "' has no value; give it one with <default> or on the command line "
+                       "(defined are: " + (values_.empty() ? "none" : join(keys(values_))) + ")");
+    result.append(text, done, dollar - done).append(values_.at(*name));
+    unused_defines_.erase(*name);
+    done = dollar + 1 + name->size();
+  }
+  return result.append(text, done);
+}
+
+void Substitutions::check_defines_used(const std::filesystem::path& file) const {
+  if (unused_defines_.empty()) return;
+  throw SceneError({file.string()}, "the definition of '" + *unused_defines_.begin() +
+                                        "' is not used: the scene has no $" +
+                                        *unused_defines_.begin());
+}
+
+}  // namespace driftlight

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The $names of scene files.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "driftlight/error.h"
+
+namespace driftlight {
+
+/// Values for $name. Those given by the user win over the <default>s of the file. A value is plain
+/// text: a $ in it is not substituted again, so that values cannot grow without bound.
+class Substitutions {
+ public:
+  explicit Substitutions(std::map<std::string, std::string> defines);
+
+  /// Takes note of <default name="..." value="...">.
+  void add_default(const std::string& name, const std::string& value);
+
+  /// The text with every $name replaced by the value of the longest name that fits there, as
+  /// Mitsuba does. Throws InputError on a name without a value.
+  std::string apply(const std::string& text);
+
+  /// Throws SceneError if the user defined a name that `file` neither uses nor declares.
+  void check_defines_used(const std::filesystem::path& file) const;
+
+ private:
+  const std::string* longest_name(std::string_view text) const;
+
+  std::map<std::string, std::string> values_;
+  std::set<std::string> unused_defines_;
+};
+
+}  // namespace driftlight

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Textures of scene files.
+#pragma once
+
+#include "image_file.h"
+#include "load_context.h"
+#include "properties.h"
+
+namespace driftlight {
+
+/// <texture type="bitmap">.
+Texture read_texture(const Element& element, LoadContext& context);
+
+/// A property that may be a colour, a <texture> or a <ref> to one.
+Texture read_textured(Properties& properties, std::string_view name, const Rgbd& fallback,
+                      LoadContext& context);
+
+/// The largest value of each component.
+Rgbd maximum_color(const Texture& texture);
+void scale(Texture& texture, double factor);
+
+/// The property `gamma` of images: absent or 0 (up to the file), -1 (sRGB) or a positive power.
+std::optional<Gamma> read_gamma(Properties& properties);
+
+}  // namespace driftlight

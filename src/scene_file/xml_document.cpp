@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "xml_document.h"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+
+#include "text.h"
+
+namespace driftlight {
+namespace {
+
+constexpr int kMaximumDepth = 32;
+
+std::string read_text(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || std::filesystem::is_directory(file))
+    throw SceneError({file.string()}, "the file cannot be opened");
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+/// Finds the first element that is nested too deeply. Iterative, as pugixml's parser is.
+struct DepthProbe : pugi::xml_tree_walker {
+  pugi::xml_node too_deep;
+
+  bool for_each(pugi::xml_node& node) override {
+    if (depth() < kMaximumDepth) return true;
+    too_deep = node;
+    return false;
+  }
+};
+
+}  // namespace
+
+XmlDocument::XmlDocument(const std::filesystem::path& file)
+    : name_(file.string()), text_(read_text(file)) {
+  const pugi::xml_parse_result result = document_.load_buffer(
+      text_.data(), text_.size(), pugi::parse_default, pugi::encoding_utf8);
+  if (!result)
+    throw SceneError(location(static_cast<std::size_t>(std::max<std::ptrdiff_t>(result.offset, 0))),
+                     "not well-formed XML: " + std::string(result.description()));
+  const pugi::xml_node second = root().next_sibling();
+  if (second && second.type() == pugi::node_element)
+    throw SceneError(location(second), "a second outermost element");
+  check_depth();
+}
+
+void XmlDocument::check_depth() const {
+  DepthProbe probe;
+  root().parent().traverse(probe);
+  if (probe.too_deep)
+    throw SceneError(location(probe.too_deep), "nested more than " +
+                                                   std::to_string(kMaximumDepth) + " levels deep");
+}
+
+SourceLocation XmlDocument::location(pugi::xml_node node) const {
+  const auto name = static_cast<std::size_t>(std::max<std::ptrdiff_t>(node.offset_debug(), 1));
+  return location(name - 1);
+}
+
+SourceLocation XmlDocument::location(std::size_t offset) const {
+  SourceLocation result{name_, 1, 1};
+  for (const char c : std::string_view(text_).substr(0, offset)) {
+    const bool continues_character = (static_cast<unsigned char>(c) & 0xC0U) == 0x80U;
+    if (c == '\n') {
+      ++result.line;
+      result.column = 1;
+    } else if (!continues_character) {
+      ++result.column;
+    }
+  }
+  return result;
+}
+
+pugi::xml_node XmlDocument::find_id(const std::string& id) const {
+  return document_.find_node([&](pugi::xml_node node) {
+    return std::string_view(node.name()) != "ref" && id == node.attribute("id").value();
+  });
+}
+
+std::optional<std::string> Element::find(const char* attribute) const {
+  const pugi::xml_attribute found = node_.attribute(attribute);
+  if (!found) return std::nullopt;
+  return with_location(*this, [&] { return substitutions_->apply(found.value()); });
+}
+
+std::string Element::text(const char* attribute) const {
+  if (auto value = find(attribute)) return *std::move(value);
+  fail("<" + tag() + "> lacks the attribute '" + attribute + "'");
+}
+
+double Element::number(const char* attribute) const {
+  const std::string value = text(attribute);
+  if (const auto parsed = parse_number(value)) return *parsed;
+  fail("'" + value + "' is not a finite number (attribute '" + attribute + "' of <" + tag() + ">)");
+}
+
+double Element::number(const char* attribute, double fallback) const {
+  return find(attribute) ? number(attribute) : fallback;
+}
+
+std::vector<double> Element::numbers(const char* attribute, std::size_t count) const {
+  const std::vector<std::string> parts = split_list(text(attribute));
+  std::vector<double> result;
+  for (const std::string& part : parts) {
+    const auto parsed = parse_number(part);
+    if (!parsed) fail("'" + part + "' is not a finite number (attribute '" + attribute + "')");
+    result.push_back(*parsed);
+  }
+  if (result.size() != count)
+    fail("attribute '" + std::string(attribute) + "' needs " + std::to_string(count) +
+         " numbers, not " + std::to_string(result.size()));
+  return result;
+}
+
+std::vector<Element> Element::children() const {
+  std::vector<Element> result;
+  for (const pugi::xml_node child : node_.children())
+    if (child.type() == pugi::node_element) result.emplace_back(*document_, child, *substitutions_);
+  return result;
+}
+
+void Element::allow_attributes(std::initializer_list<std::string_view> names) const {
+  for (const pugi::xml_attribute attribute : node_.attributes()) {
+    const std::string_view name = attribute.name();
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      fail("unknown attribute '" + std::string(name) + "' of <" + tag() +
+           ">; valid are: " + join({names.begin(), names.end()}));
+  }
+}
+
+void Element::fail(const std::string& message) const { throw SceneError(location(), message); }
+
+std::optional<Element> Element::find_id(const std::string& id) const {
+  const pugi::xml_node node = document_->find_id(id);
+  if (!node) return std::nullopt;
+  return Element(*document_, node, *substitutions_);
+}
+
+bool Element::is_inside(const Element& other) const {
+  for (pugi::xml_node node = node_; node; node = node.parent())
+    if (node == other.node_) return true;
+  return false;
+}
+
+}  // namespace driftlight

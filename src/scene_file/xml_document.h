@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+/// XML files whose elements know where they stand.
+#pragma once
+
+#include <filesystem>
+#include <initializer_list>
+#include <optional>
+#include <pugixml.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "driftlight/error.h"
+#include "substitutions.h"
+
+namespace driftlight {
+
+/// A parsed file. Elements refer to it and must not outlive it.
+class XmlDocument {
+ public:
+  /// Throws SceneError if the file cannot be read, is not well-formed, has not exactly one
+  /// outermost element, or is nested deeper than any scene needs.
+  explicit XmlDocument(const std::filesystem::path& file);
+  XmlDocument(const XmlDocument&) = delete;
+  XmlDocument& operator=(const XmlDocument&) = delete;
+
+  pugi::xml_node root() const { return document_.document_element(); }
+  /// Of the '<' that opens the element.
+  SourceLocation location(pugi::xml_node node) const;
+  /// The first element with this id, as written.
+  pugi::xml_node find_id(const std::string& id) const;
+
+ private:
+  /// Of a byte of the file; columns count characters.
+  SourceLocation location(std::size_t offset) const;
+  void check_depth() const;
+
+  std::string name_;
+  std::string text_;
+  pugi::xml_document document_;
+};
+
+/// One element; attributes are read after substitution of $names.
+class Element {
+ public:
+  Element(const XmlDocument& document, pugi::xml_node node, Substitutions& substitutions)
+      : document_(&document), node_(node), substitutions_(&substitutions) {}
+
+  std::string tag() const { return node_.name(); }
+  std::optional<std::string> find(const char* attribute) const;
+  /// The same, and throws SceneError if it is missing.
+  std::string text(const char* attribute) const;
+  double number(const char* attribute) const;
+  double number(const char* attribute, double fallback) const;
+  /// `count` numbers, separated by commas or blanks.
+  std::vector<double> numbers(const char* attribute, std::size_t count) const;
+
+  std::vector<Element> children() const;
+  /// Throws SceneError on an attribute with another name.
+  void allow_attributes(std::initializer_list<std::string_view> names) const;
+
+  SourceLocation location() const { return document_->location(node_); }
+  [[noreturn]] void fail(const std::string& message) const;
+
+  /// The element of the same file with this id, if any.
+  std::optional<Element> find_id(const std::string& id) const;
+  bool is_inside(const Element& other) const;
+
+ private:
+  const XmlDocument* document_;
+  pugi::xml_node node_;
+  Substitutions* substitutions_;
+};
+
+/// Runs `read` and gives its InputErrors, which know no place, the place of the element.
+template <class Read>
+auto with_location(const Element& element, Read read) {
+  try {
+    return read();
+  } catch (const SceneError&) {
+    throw;
+  } catch (const InputError& error) {
+    element.fail(error.what());
+  }
+}
+
+}  // namespace driftlight
