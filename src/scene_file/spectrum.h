@@ -22,7 +22,7 @@ Spectrum ramp_to_zero(Spectrum spectrum);
 
 /// Linear sRGB of a spectrum, as a Mitsuba of three channels sees it: XYZ = integral of the spectrum
 /// times the CIE 1931 matching functions over the integral of y, exact for the piecewise linear
-/// tables. Equal energy 1 gives (1.2048, 0.9483, 0.9087), not white. Colours outside of the
+/// tables. Equal energy 1 gives (1.2049, 0.9483, 0.9093), not white. Colours outside of the
 /// gamut are clamped to it, at zero.
 Rgbd spectrum_to_rgb(const Spectrum& spectrum);
 

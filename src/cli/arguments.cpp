@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/arguments.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <sstream>
+#include <string_view>
+#include <system_error>
+#include <type_traits>
+
+namespace driftlight::cli {
+
+namespace {
+
+/// Parses the whole of `text` as a finite number of at least `low`, above it for floating point.
+template <class T>
+T parse_number(std::string_view flag, const std::string& text, T low) {
+  T x{};
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, x);
+  bool good = error == std::errc() && stop == end;
+  std::string wanted = fmt::format("an integer from {} to {}", low, std::numeric_limits<T>::max());
+  if constexpr (std::is_floating_point_v<T>) {
+    good = good && std::isfinite(x) && x > low;
+    wanted = fmt::format("a number > {}", low);
+  }
+  if (!good || x < low) throw UsageError(fmt::format("{} is '{}': must be {}", flag, text, wanted));
+  return x;
+}
+
+std::pair<std::string, std::string> split_setting(std::string_view flag, const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == 0 || equals == std::string::npos)
+    throw UsageError(fmt::format("{} is '{}': must be name=value", flag, text));
+  return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+/// The command line as text; its meaning comes afterwards.
+struct Raw {
+  std::string scene;
+  std::vector<std::string> outputs;
+  std::string integrator = "langevin";
+  std::vector<std::string> defines;
+  std::vector<std::string> settings;
+  std::optional<std::string> time;
+  std::optional<std::string> mutations_per_pixel;
+  std::optional<std::string> samples_per_pixel;
+  std::string threads = "0";
+  std::string seed = "0";
+  std::string statistics;
+  bool verbose = false;
+  bool quiet = false;
+  bool integrators = false;
+  std::string image;
+  std::string reference;
+  bool json = false;
+};
+
+/// An option that may be repeated and takes one argument each time.
+CLI::Option* add_repeatable(CLI::App& app, const std::string& flags, std::vector<std::string>& into,
+                            const std::string& help) {
+  return app.add_option(flags, into, help)->allow_extra_args(false);
+}
+
+void declare_render(CLI::App& app, Raw& raw) {
+  app.add_option("scene", raw.scene, "Mitsuba scene file (XML)")->required()->type_name("SCENE");
+  add_repeatable(app, "-o,--output", raw.outputs,
+                 "image to write, by its ending: .exr, .pfm, .hdr, .png, ..; repeatable "
+                 "(default: the scene's name with .exr, in this folder)")
+      ->type_name("FILE");
+  app.add_option("--integrator", raw.integrator, "langevin or path")->capture_default_str();
+  add_repeatable(app, "-D,--define", raw.defines, "value for $NAME in the scene; repeatable")
+      ->type_name("NAME=VALUE");
+  add_repeatable(app, "--set", raw.settings,
+                 "option of the integrator, see `driftlight info --integrators`; repeatable")
+      ->type_name("OPTION=VALUE");
+  app.add_option("--time", raw.time, "render for this long")->type_name("SECONDS");
+  app.add_option("--mutations-per-pixel", raw.mutations_per_pixel,
+                 "work of the langevin integrator (default: 100)")
+      ->type_name("N");
+  app.add_option("--spp", raw.samples_per_pixel,
+                 "work of the path integrator, samples per pixel (default: 64)")
+      ->type_name("N");
+  app.add_option("-t,--threads", raw.threads, "threads; 0: all")
+      ->type_name("N")
+      ->capture_default_str();
+  app.add_option("--seed", raw.seed, "seed of the random numbers")
+      ->type_name("N")
+      ->capture_default_str();
+  app.add_option("--stats", raw.statistics, "write statistics as JSON")->type_name("FILE");
+  app.add_flag("-v,--verbose", raw.verbose, "say more at the end");
+  app.add_flag("-q,--quiet", raw.quiet, "say nothing but errors");
+}
+
+void declare_info(CLI::App& app, Raw& raw) {
+  app.add_option("scene", raw.scene, "Mitsuba scene file (XML)")->type_name("SCENE");
+  add_repeatable(app, "-D,--define", raw.defines, "value for $NAME in the scene; repeatable")
+      ->type_name("NAME=VALUE");
+  app.add_flag("--integrators", raw.integrators, "list the integrators and their options");
+}
+
+void declare_diff(CLI::App& app, Raw& raw) {
+  app.add_option("image", raw.image, "image")->required()->type_name("IMAGE");
+  app.add_option("reference", raw.reference, "what it should be")
+      ->required()
+      ->type_name("REFERENCE");
+  app.add_flag("--json", raw.json, "print JSON");
+}
+
+SceneArguments scene_arguments(const Raw& raw) {
+  SceneArguments scene{.file = raw.scene, .defines = {}};
+  for (const std::string& define : raw.defines) {
+    const auto [name, value] = split_setting("-D", define);
+    scene.defines.insert_or_assign(name, value);
+  }
+  return scene;
+}
+
+/// At most one of the three, and the one that the integrator has.
+void set_work(const Raw& raw, RenderCommand& command) {
+  const int given =
+      (raw.time ? 1 : 0) + (raw.mutations_per_pixel ? 1 : 0) + (raw.samples_per_pixel ? 1 : 0);
+  if (given > 1) throw UsageError("give only one of --time, --mutations-per-pixel and --spp");
+  if (raw.samples_per_pixel && command.integrator != Integrator::Path)
+    throw UsageError("--spp is for the path integrator; langevin takes --mutations-per-pixel");
+  if (raw.mutations_per_pixel && command.integrator != Integrator::Langevin)
+    throw UsageError("--mutations-per-pixel is for the langevin integrator; path takes --spp");
+  if (raw.time) command.time = parse_number("--time", *raw.time, 0.0);
+  if (raw.mutations_per_pixel)
+    command.mutations_per_pixel =
+        parse_number("--mutations-per-pixel", *raw.mutations_per_pixel, 0.0);
+  if (raw.samples_per_pixel)
+    command.samples_per_pixel = parse_number("--spp", *raw.samples_per_pixel, 1);
+}
+
+RenderCommand render_command(const Raw& raw) {
+  RenderCommand command;
+  command.scene = scene_arguments(raw);
+  command.outputs.assign(raw.outputs.begin(), raw.outputs.end());
+  if (command.outputs.empty()) command.outputs.emplace_back(command.scene.file.stem() += ".exr");
+  if (raw.integrator == "path")
+    command.integrator = Integrator::Path;
+  else if (raw.integrator != "langevin")
+    throw UsageError(
+        fmt::format("unknown integrator '{}'; the integrators are langevin, path", raw.integrator));
+  for (const std::string& setting : raw.settings)
+    command.settings.push_back(split_setting("--set", setting));
+  set_work(raw, command);
+  command.threads = parse_number("--threads", raw.threads, 0);
+  command.seed = parse_number("--seed", raw.seed, std::uint64_t{0});
+  if (!raw.statistics.empty()) command.statistics = raw.statistics;
+  if (raw.verbose && raw.quiet) throw UsageError("give only one of -v and -q");
+  if (raw.verbose) command.verbosity = Verbosity::Verbose;
+  if (raw.quiet) command.verbosity = Verbosity::Quiet;
+  return command;
+}
+
+}  // namespace
+
+Command parse_arguments(int argc, const char* const* argv) {
+  Raw raw;
+  CLI::App app("driftlight renders scenes by Langevin sampling of light paths.", "driftlight");
+  app.set_version_flag("--version", "driftlight " DRIFTLIGHT_VERSION);
+  app.require_subcommand(1);
+  CLI::App& render = *app.add_subcommand("render", "render a scene");
+  CLI::App& info = *app.add_subcommand("info", "what is in a scene, or the integrators");
+  CLI::App& diff = *app.add_subcommand("diff", "compare an image with a reference");
+  declare_render(render, raw);
+  declare_info(info, raw);
+  declare_diff(diff, raw);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    std::ostringstream text;
+    if (app.exit(error, text, text) == 0) return PrintCommand{text.str()};
+    throw UsageError(error.what());
+  }
+  if (render.parsed()) return render_command(raw);
+  if (diff.parsed()) return DiffCommand{raw.image, raw.reference, raw.json};
+  if (raw.integrators == !raw.scene.empty())
+    throw UsageError("info takes either a scene or --integrators");
+  if (raw.integrators) return IntegratorsCommand{};
+  return InfoCommand{scene_arguments(raw)};
+}
+
+}  // namespace driftlight::cli

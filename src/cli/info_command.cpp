@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "cli/commands.h"
+#include "cli/max_depth.h"
+#include "cli/print.h"
+#include "driftlight/options.h"
+#include "driftlight/scene_file.h"
+
+namespace driftlight::cli {
+
+namespace {
+
+std::string row(std::string_view name, const std::string& text) {
+  return fmt::format("{:<11} {}\n", name, text);
+}
+
+/// How many objects there are of each kind, by index of the variant.
+template <std::size_t N>
+using Counts = std::array<int, N>;
+
+template <class... Kinds>
+Counts<sizeof...(Kinds)> count_kinds(std::span<const std::variant<Kinds...>> objects) {
+  Counts<sizeof...(Kinds)> counts{};
+  for (const auto& object : objects) ++counts.at(object.index());
+  return counts;
+}
+
+/// "3 diffuse, 1 phong"
+template <std::size_t N>
+std::string list(const Counts<N>& counts, const std::array<std::string_view, N>& names) {
+  std::vector<std::string> texts;
+  for (std::size_t i = 0; i < N; ++i)
+    if (counts.at(i) > 0) texts.push_back(fmt::format("{} {}", counts.at(i), names.at(i)));
+  return texts.empty() ? "none" : fmt::format("{}", fmt::join(texts, ", "));
+}
+
+std::string list_shapes(std::span<const Shape> shapes) {
+  constexpr std::array<std::string_view, 3> kNames{"mesh", "sphere", "disk"};
+  Counts<3> counts{};
+  std::size_t triangles = 0;
+  for (const Shape& shape : shapes) {
+    ++counts.at(shape.geometry.index());
+    if (const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry))
+      triangles += mesh->triangles.size();
+  }
+  return fmt::format("{} ({} triangles)", list(counts, kNames), triangles);
+}
+
+std::string depth_text(const LoadedScene& loaded) {
+  const MaxDepth depth = max_depth(loaded, LangevinOptions{}.max_depth);
+  return depth.notice.empty() ? fmt::format("{} edges", depth.edges)
+                              : fmt::format("{} edges ({})", depth.edges, depth.notice);
+}
+
+/// The integrator's line, and below it one line an option, in columns.
+template <class Options>
+std::string describe_integrator(std::string_view name, std::string_view method) {
+  Options defaults;
+  std::vector<std::array<std::string, 4>> rows;
+  std::array<std::size_t, 4> widths{};
+  for (const OptionEntry& option : entries(defaults)) {
+    rows.push_back({std::string(option.name), option.values, "default " + option.get(),
+                    std::string(option.help)});
+    for (std::size_t i = 0; i < widths.size(); ++i)
+      widths.at(i) = std::max(widths.at(i), rows.back().at(i).size());
+  }
+  std::string lines = fmt::format("{}: {}\n", name, method);
+  for (const auto& row : rows)
+    lines += fmt::format("  {:<{}}  {:<{}}  {:<{}}  {}\n", row[0], widths[0], row[1], widths[1],
+                         row[2], widths[2], row[3]);
+  return lines;
+}
+
+}  // namespace
+
+void run(const InfoCommand& command) {
+  const LoadedScene loaded = load_scene(command.scene.file, {.defines = command.scene.defines});
+  const Scene& scene = loaded.scene;
+  constexpr std::array<std::string_view, 6> kBsdfs{
+      "diffuse", "conductor", "roughconductor", "dielectric", "roughdielectric", "phong"};
+  constexpr std::array<std::string_view, 4> kEmitters{"area", "point", "constant", "envmap"};
+  std::string text = row("scene", command.scene.file.string());
+  text += row("film",
+              fmt::format("{} x {} pixels", scene.camera().film_width, scene.camera().film_height));
+  text += row("max depth", depth_text(loaded));
+  text += row("shapes", list_shapes(scene.shapes()));
+  text += row("bsdfs", list(count_kinds(scene.bsdfs()), kBsdfs));
+  text += row("emitters", list(count_kinds(scene.emitters()), kEmitters));
+  for (const std::string& notice : loaded.notices) text += row("notice", notice);
+  print(text);
+}
+
+void run(const IntegratorsCommand& /*command*/) {
+  print(describe_integrator<LangevinOptions>(
+            "langevin",
+            "Metropolis-adjusted Langevin sampling of light paths (Ershov, Frolov, Nikolaev and "
+            "Voloboy 2023, doi 10.20948/prepr-2023-63)") +
+        describe_integrator<PathOptions>(
+            "path",
+            "path tracing with next-event estimation (Kajiya 1986, doi 10.1145/15922.15902; "
+            "Veach 1997)"));
+}
+
+}  // namespace driftlight::cli

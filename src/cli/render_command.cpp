@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <utility>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "cli/max_depth.h"
+#include "cli/print.h"
+#include "cli/progress_bar.h"
+#include "cli/report.h"
+#include "driftlight/image.h"
+#include "driftlight/render.h"
+#include "driftlight/scene_file.h"
+#include "pending_file.h"
+#include "stopwatch.h"
+
+namespace driftlight::cli {
+
+namespace {
+
+struct Rendered {
+  Image image;
+  Report report;
+};
+
+LangevinResult render_with(const Scene& scene, const LangevinOptions& options,
+                           const RenderOptions& render, const RenderCommand& command) {
+  return render_langevin(scene, options, render, command.mutations_per_pixel);
+}
+
+PathResult render_with(const Scene& scene, const PathOptions& options, const RenderOptions& render,
+                       const RenderCommand& command) {
+  return render_path(scene, options, render, command.samples_per_pixel);
+}
+
+void check_outputs(const RenderCommand& command) {
+  for (const auto& file : command.outputs) check_writable(file);
+  if (command.statistics) check_target(*command.statistics);
+}
+
+void write_text(const std::filesystem::path& file, const std::string& text) {
+  PendingFile pending(file);
+  std::ofstream out(pending.temporary());
+  out << text;
+  out.close();
+  if (!out) throw RuntimeError(fmt::format("cannot write '{}'", file.string()));
+  pending.commit();
+}
+
+/// Shows nothing if quiet, the rest by degrees.
+class Talk {
+ public:
+  explicit Talk(Verbosity verbosity) : verbosity_(verbosity) {}
+
+  bool quiet() const { return verbosity_ == Verbosity::Quiet; }
+  void notice(const std::string& text) const {
+    if (!quiet()) print_notice(text);
+  }
+  void summary(const std::vector<std::string>& lines) const {
+    if (!quiet()) print_lines(lines);
+  }
+  void details(const std::vector<std::string>& lines) const {
+    if (verbosity_ == Verbosity::Verbose) print_lines(lines);
+  }
+
+ private:
+  static void print_lines(const std::vector<std::string>& lines) {
+    for (const std::string& line : lines) print(line + "\n");
+  }
+
+  Verbosity verbosity_;
+};
+
+/// Applies the settings, before anything takes time; true if one of them is the depth.
+bool apply_settings(const RenderCommand& command, const std::vector<OptionEntry>& options) {
+  bool has_depth = false;
+  for (const auto& [name, value] : command.settings) {
+    set_option(options, name, value);
+    has_depth = has_depth || name == "max_depth";
+  }
+  return has_depth;
+}
+
+void write_outputs(const RenderCommand& command, const Image& image, Report& report,
+                   const Talk& talk) {
+  const Stopwatch watch;
+  for (const auto& file : command.outputs) {
+    write_image(file, image, report.metadata);
+    report.summary.push_back(fmt::format("wrote {}", file.string()));
+  }
+  report.statistics["seconds"]["write"] = watch.seconds();
+  if (command.statistics) {
+    write_text(*command.statistics, report.statistics.dump(2) + "\n");
+    report.summary.push_back(fmt::format("wrote {}", command.statistics->string()));
+  }
+  talk.summary(report.summary);
+  talk.details(report.details);
+}
+
+template <class Options>
+void render(const RenderCommand& command) {
+  const Talk talk(command.verbosity);
+  Options options;
+  const std::vector<OptionEntry> option_entries = entries(options);
+  const bool has_depth = apply_settings(command, option_entries);
+  check_outputs(command);
+
+  const Stopwatch watch;
+  const LoadedScene loaded = load_scene(command.scene.file, {.defines = command.scene.defines});
+  const double load_seconds = watch.seconds();
+  for (const std::string& notice : loaded.notices) talk.notice(notice);
+  if (!has_depth) {
+    const MaxDepth depth = max_depth(loaded, options.max_depth);
+    options.max_depth = depth.edges;
+    if (!depth.notice.empty()) talk.notice(depth.notice);
+  }
+
+  RenderOptions how;
+  how.threads = command.threads;
+  how.seed = command.seed;
+  how.time = command.time;
+  how.stop = &stop_on_interrupt();
+  const auto result = [&] {
+    ProgressBar bar(!talk.quiet());
+    how.progress = [&](const Progress& progress) { bar.update(progress); };
+    return render_with(loaded.scene, options, how, command);
+  }();
+  Report report = make_report(result, option_entries, how);
+  if (report.empty) throw RuntimeError("stopped before there was an image; nothing is written");
+  if (report.stopped) talk.notice("stopped early: the image holds what was rendered so far");
+  report.statistics["seconds"]["load"] = load_seconds;
+  write_outputs(command, result.image, report, talk);
+}
+
+}  // namespace
+
+void run(const RenderCommand& command) {
+  switch (command.integrator) {
+    case Integrator::Langevin:
+      return render<LangevinOptions>(command);
+    case Integrator::Path:
+      return render<PathOptions>(command);
+  }
+}
+
+}  // namespace driftlight::cli

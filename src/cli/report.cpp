@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/report.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <thread>
+
+namespace driftlight::cli {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// A number if it is written like one, else text.
+Json option_value(const std::string& text) {
+  double x = 0;
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, x);
+  if (error != std::errc() || stop != end) return text;
+  return Json::parse(text);
+}
+
+/// What all integrators report alike.
+Report common_report(const std::string& integrator, const Image& image,
+                     const std::vector<OptionEntry>& options, const RenderOptions& render) {
+  Report report;
+  std::vector<std::string> settings;
+  Json values = Json::object();
+  for (const OptionEntry& option : options) {
+    const std::string value = option.get();
+    settings.push_back(fmt::format("{}={}", option.name, value));
+    values[std::string(option.name)] = option_value(value);
+  }
+  report.metadata = {{"Software", "driftlight " DRIFTLIGHT_VERSION},
+                     {"driftlight:integrator", integrator},
+                     {"driftlight:options", fmt::format("{}", fmt::join(settings, " "))},
+                     {"driftlight:seed", fmt::format("{}", render.seed)}};
+  const auto threads = render.threads > 0 ? static_cast<unsigned>(render.threads)
+                                          : std::thread::hardware_concurrency();
+  report.statistics = {{"driftlight", DRIFTLIGHT_VERSION},
+                       {"integrator", integrator},
+                       {"options", values},
+                       {"seed", render.seed},
+                       {"threads", threads},
+                       {"image", {{"width", image.width}, {"height", image.height}}}};
+  return report;
+}
+
+double pixel_count(const Image& image) {
+  return static_cast<double>(image.width) * static_cast<double>(image.height);
+}
+
+double per_second(double count, double seconds) { return seconds > 0.0 ? count / seconds : 0.0; }
+
+Json to_json(const KernelStatistics& kernel) {
+  return {{"proposed", kernel.proposed}, {"acceptance", kernel.acceptance()}};
+}
+
+std::string describe(const char* name, const KernelStatistics& kernel) {
+  return fmt::format("{}: {} proposed, acceptance {:.4f}", name, kernel.proposed,
+                     kernel.acceptance());
+}
+
+std::string describe(const Rejections& r, std::uint64_t proposed) {
+  const auto percent = [&](std::uint64_t n) {
+    return 100.0 * static_cast<double>(n) /
+           static_cast<double>(std::max<std::uint64_t>(1, proposed));
+  };
+  return fmt::format(
+      "small steps rejected: {:.2f} % missed, {:.2f} % other lobe, {:.2f} % occluded, "
+      "{:.2f} % not finite, {:.2f} % by Hastings",
+      percent(r.missed), percent(r.other_lobe), percent(r.occluded), percent(r.non_finite),
+      percent(r.hastings));
+}
+
+std::string path_lengths(const LangevinStatistics& s) {
+  std::string text = "mutations at paths of n edges:";
+  for (std::size_t n = 1; n < s.path_length.size(); ++n)
+    if (s.path_length[n] > 0) text += fmt::format(" {}:{}", n, s.path_length[n]);
+  return text;
+}
+
+}  // namespace
+
+Report make_report(const LangevinResult& result, const std::vector<OptionEntry>& options,
+                   const RenderOptions& render) {
+  const LangevinStatistics& s = result.statistics;
+  Report report = common_report("langevin", result.image, options, render);
+  report.stopped = s.stopped;
+  report.empty = s.mutations == 0;
+  report.metadata["driftlight:b"] = fmt::format("{}", s.b);
+  report.metadata["driftlight:mutations"] = fmt::format("{}", s.mutations);
+
+  const auto mutations = static_cast<double>(s.mutations);
+  const double rate = per_second(mutations, s.render_seconds);
+  report.statistics.update(
+      {{"stopped", s.stopped},
+       {"b", s.b},
+       {"b_error", s.b_error},
+       {"mutations", s.mutations},
+       {"mutations_per_second", rate},
+       {"kernels", {{"large_step", to_json(s.large_step)}, {"small_step", to_json(s.small_step)}}},
+       {"rejections",
+        {{"missed", s.rejections.missed},
+         {"other_lobe", s.rejections.other_lobe},
+         {"occluded", s.rejections.occluded},
+         {"non_finite", s.rejections.non_finite},
+         {"hastings", s.rejections.hastings}}},
+       {"path_lengths", s.path_length},
+       {"seconds", {{"bootstrap", s.bootstrap_seconds}, {"render", s.render_seconds}}}});
+  report.summary = {
+      fmt::format("langevin: {} x {} pixels, {} mutations ({:.4g} per pixel) in {:.2f} s, {:.4g} "
+                  "per second",
+                  result.image.width, result.image.height, s.mutations,
+                  mutations / pixel_count(result.image), s.render_seconds, rate),
+      fmt::format("b = {:.6g} +- {:.2g}", s.b, s.b_error)};
+  report.details = {describe("large steps", s.large_step), describe("small steps", s.small_step),
+                    describe(s.rejections, s.small_step.proposed), path_lengths(s)};
+  return report;
+}
+
+Report make_report(const PathResult& result, const std::vector<OptionEntry>& options,
+                   const RenderOptions& render) {
+  Report report = common_report("path", result.image, options, render);
+  report.stopped = result.stopped;
+  report.empty = !(result.samples_per_pixel > 0.0);
+  report.metadata["driftlight:samples_per_pixel"] = fmt::format("{}", result.samples_per_pixel);
+
+  const double rate =
+      per_second(result.samples_per_pixel * pixel_count(result.image), result.render_seconds);
+  report.statistics.update({{"stopped", result.stopped},
+                            {"samples_per_pixel", result.samples_per_pixel},
+                            {"samples_per_second", rate},
+                            {"non_finite", result.non_finite},
+                            {"seconds", {{"render", result.render_seconds}}}});
+  report.summary = {fmt::format(
+      "path: {} x {} pixels, {:.4g} samples per pixel in {:.2f} s, {:.4g} samples per second",
+      result.image.width, result.image.height, result.samples_per_pixel, result.render_seconds,
+      rate)};
+  if (result.non_finite > 0)
+    report.summary.push_back(
+        fmt::format("{} samples were not finite and count as no light", result.non_finite));
+  return report;
+}
+
+}  // namespace driftlight::cli

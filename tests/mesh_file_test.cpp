@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Meshes of obj and serialized files.
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "driftlight/scene_file.h"
+#include "support/scene_directory.h"
+
+namespace driftlight {
+namespace {
+
+using test::expect_near;
+using test::lit;
+using test::SceneDirectory;
+
+std::string shape_element(const std::string& type, const std::string& content) {
+  return "<shape type=\"" + type + "\"><string name=\"filename\" value=\"mesh\"/>" + content +
+         "</shape>";
+}
+
+/// The meshes of a scene with one shape, whose file is "mesh".
+std::vector<TriangleMesh> load_meshes(const std::string& type, const std::string& file,
+                                      const std::string& content = "") {
+  const SceneDirectory directory;
+  directory.write("mesh", file);
+  const LoadedScene loaded = directory.load(lit(shape_element(type, content)));
+  std::vector<TriangleMesh> meshes;
+  for (const Shape& shape : loaded.scene.shapes())
+    meshes.push_back(std::get<TriangleMesh>(shape.geometry));
+  return meshes;
+}
+
+TriangleMesh load_mesh(const std::string& type, const std::string& file,
+                       const std::string& content = "") {
+  const std::vector<TriangleMesh> meshes = load_meshes(type, file, content);
+  EXPECT_EQ(meshes.size(), 1U);
+  return meshes.at(0);
+}
+
+/// The message of the error that loading the file must raise; it stands at the shape.
+std::string mesh_error(const std::string& type, const std::string& file,
+                       const std::string& content = "") {
+  try {
+    load_meshes(type, file, content);
+  } catch (const SceneError& error) {
+    EXPECT_EQ(error.location().line, 2);
+    EXPECT_EQ(error.location().column, 1);
+    return error.what();
+  }
+  ADD_FAILURE() << "loaded without an error";
+  return {};
+}
+
+void expect_contains(const std::string& text, const std::string& fragment) {
+  EXPECT_NE(text.find(fragment), std::string::npos) << "no \"" << fragment << "\" in: " << text;
+}
+
+Eigen::Vector3f winding_normal(const TriangleMesh& mesh, std::size_t triangle) {
+  const auto& t = mesh.triangles[triangle];
+  const Eigen::Vector3f a = mesh.positions[t[0]];
+  return (mesh.positions[t[1]] - a).cross(mesh.positions[t[2]] - a).normalized();
+}
+
+std::string transform(const std::string& step) {
+  return "<transform name=\"toWorld\">" + step + "</transform>";
+}
+
+const std::string kFaceNormals = R"(<boolean name="faceNormals" value="true"/>)";
+const std::string kFlipNormals = R"(<boolean name="flipNormals" value="true"/>)";
+
+// --- obj -----------------------------------------------------------------------------------------
+
+const std::string kSquare = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+/// Two unit squares that meet at a right angle along the y axis.
+const std::string kRoof =
+    "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 -1\nv 0 1 -1\nf 1 2 3 4\nf 5 1 4 6\n";
+
+TEST(ObjFile, TriangulatesPolygons) {
+  const TriangleMesh mesh = load_mesh("obj", kSquare);
+  ASSERT_EQ(mesh.triangles.size(), 2U);
+  EXPECT_EQ(mesh.positions.size(), 4U);
+  EXPECT_TRUE(mesh.uvs.empty());
+  expect_near(winding_normal(mesh, 0), Eigen::Vector3f(0, 0, 1));
+  expect_near(winding_normal(mesh, 1), Eigen::Vector3f(0, 0, 1));
+}
+
+TEST(ObjFile, NegativeIndicesCountFromTheEnd) {
+  const TriangleMesh mesh = load_mesh("obj", "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n");
+  ASSERT_EQ(mesh.positions.size(), 3U);
+  expect_near(mesh.positions[mesh.triangles[0][1]], Eigen::Vector3f(1, 0, 0));
+}
+
+TEST(ObjFile, FlipsTextureCoordinatesByDefault) {
+  const std::string file = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.25 0.1\nf 1/1 2/1 3/1\n";
+  expect_near(load_mesh("obj", file).uvs.at(0), Eigen::Vector2f(0.25F, 0.9F));
+  const std::string keep = R"(<boolean name="flipTexCoords" value="false"/>)";
+  expect_near(load_mesh("obj", file, keep).uvs.at(0), Eigen::Vector2f(0.25F, 0.1F));
+}
+
+TEST(ObjFile, SmoothsMeshesWithoutNormals) {
+  const TriangleMesh mesh = load_mesh("obj", kRoof);
+  // At the ridge both squares have equal angles; elsewhere one square counts.
+  const float half = std::sqrt(0.5F);
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const Eigen::Vector3f& p = mesh.positions[i];
+    const Eigen::Vector3f expected = p.x() == 1.0F    ? Eigen::Vector3f(0, 0, 1)
+                                     : p.z() == -1.0F ? Eigen::Vector3f(-1, 0, 0)
+                                                      : Eigen::Vector3f(-half, 0, half);
+    expect_near(mesh.normals.at(i), expected);
+  }
+}
+
+TEST(ObjFile, KeepsCreases) {
+  const auto vertices = [](const std::string& angle) {
+    const std::string property = "<float name=\"maxSmoothAngle\" value=\"" + angle + "\"/>";
+    const TriangleMesh mesh = load_mesh("obj", kRoof, property);
+    EXPECT_EQ(mesh.normals.size(), mesh.positions.size());
+    EXPECT_EQ(mesh.triangles.size(), 4U);
+    return mesh.positions.size();
+  };
+  EXPECT_EQ(vertices("89"), 8U);
+  EXPECT_EQ(vertices("91"), 6U);
+  const TriangleMesh sharp =
+      load_mesh("obj", kRoof, R"(<float name="maxSmoothAngle" value="30"/>)");
+  for (std::size_t t = 0; t < sharp.triangles.size(); ++t)
+    for (const std::uint32_t vertex : sharp.triangles[t])
+      expect_near(sharp.normals[vertex], winding_normal(sharp, t));
+}
+
+TEST(ObjFile, DropsNormalsOnDemand) {
+  const TriangleMesh plain = load_mesh("obj", kSquare, kFaceNormals);
+  EXPECT_TRUE(plain.normals.empty());
+  expect_near(winding_normal(plain, 0), Eigen::Vector3f(0, 0, 1));
+  const TriangleMesh flipped = load_mesh("obj", kSquare, kFaceNormals + kFlipNormals);
+  expect_near(winding_normal(flipped, 0), Eigen::Vector3f(0, 0, -1));
+}
+
+TEST(ObjFile, FlipsNormals) {
+  const std::string file = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 2\nf 1//1 2//1 3//1\n";
+  expect_near(load_mesh("obj", file).normals.at(0), Eigen::Vector3f(0, 0, 1));
+  expect_near(load_mesh("obj", file, kFlipNormals).normals.at(0), Eigen::Vector3f(0, 0, -1));
+  expect_near(load_mesh("obj", kSquare, kFlipNormals).normals.at(0), Eigen::Vector3f(0, 0, -1));
+}
+
+TEST(ObjFile, TransformsNormalsByTheInverseTranspose) {
+  const std::string file = "v 0 0 0\nv 1 0 1\nv 0 1 0\nvn -1 0 1\nf 1//1 2//1 3//1\n";
+  const TriangleMesh mesh = load_mesh("obj", file, transform(R"(<scale x="2"/>)"));
+  const Eigen::Vector3f edge = mesh.positions[1] - mesh.positions[0];
+  EXPECT_NEAR(mesh.normals.at(0).dot(edge), 0.0F, 1e-6F);
+  expect_near(mesh.normals.at(0), Eigen::Vector3f(-1, 0, 2).normalized().eval());
+}
+
+TEST(ObjFile, GroupsAreSmoothedApart) {
+  const std::string groups =
+      "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 -1\nv 0 1 -1\n"
+      "g top\nf 1 2 3 4\ng side\nf 5 1 4 6\n";
+  const std::vector<TriangleMesh> meshes = load_meshes("obj", groups);
+  ASSERT_EQ(meshes.size(), 2U);
+  for (const auto& normal : meshes[1].normals) expect_near(normal, Eigen::Vector3f(-1, 0, 0));
+  EXPECT_EQ(load_meshes("obj", groups, R"(<boolean name="collapse" value="true"/>)").size(), 1U);
+}
+
+TEST(ObjFile, MaterialsOfTheFileNeedABsdf) {
+  const std::string file = "mtllib a.mtl\nusemtl red\n" + kSquare;
+  expect_contains(mesh_error("obj", file), ".mtl");
+  EXPECT_EQ(load_meshes("obj", file, "<bsdf type=\"diffuse\"/>").size(), 1U);
+}
+
+TEST(ObjFile, RefusesBadFiles) {
+  expect_contains(mesh_error("obj", "v 0 0 0\n"), "no faces");
+  expect_contains(mesh_error("obj", ""), "no faces");
+  expect_contains(mesh_error("obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n"), "vertex 3");
+  expect_contains(mesh_error("obj", "v 0 0 0\nf 1 1 -2\n"), "vertex -2");
+  expect_contains(mesh_error("obj", "v 0 0 0\nf a b c\n"), "vertex 0");
+  expect_contains(mesh_error("obj", "v 0 0 0\nf 1//2 1//2 1//2\n"), "normal 2");
+  expect_contains(mesh_error("obj", "v 0 0 0\nf 1/5 1/5 1/5\n"), "texture coordinate 5");
+  expect_contains(mesh_error("obj", "v 0 0 0\nf 1 1\n"), "three corners");
+  expect_contains(mesh_error("obj", "v 1e999 0 0\nf 1 1 1\n"), "finite");
+  expect_contains(mesh_error("obj", "v 0 0 0\nvn 0 0 1\nf 1//1 1//1 1//1\nf 1 1 1\n"),
+                  "normals");
+}
+
+// --- serialized ----------------------------------------------------------------------------------
+
+template <class T>
+void append(std::string& bytes, T value) {
+  const auto* const begin = reinterpret_cast<const char*>(&value);
+  bytes.append(begin, sizeof(T));
+}
+
+template <class T>
+void append_all(std::string& bytes, std::initializer_list<T> values) {
+  for (const T value : values) append(bytes, value);
+}
+
+std::string compress_bytes(const std::string& bytes) {
+  uLongf size = compressBound(static_cast<uLong>(bytes.size()));
+  std::string result(size, '\0');
+  EXPECT_EQ(compress(reinterpret_cast<Bytef*>(result.data()), &size,
+                     reinterpret_cast<const Bytef*>(bytes.data()),
+                     static_cast<uLong>(bytes.size())),
+            Z_OK);
+  result.resize(size);
+  return result;
+}
+
+std::string mesh_header(std::uint16_t version) {
+  std::string bytes;
+  append_all<std::uint16_t>(bytes, {0x041C, version});
+  return bytes;
+}
+
+/// What comes before the vertices, uncompressed.
+std::string mesh_preamble(std::uint16_t version, std::uint32_t flags, std::uint64_t vertices,
+                          std::uint64_t triangles) {
+  std::string bytes;
+  append(bytes, flags);
+  if (version == 4) bytes += std::string("name") + '\0';
+  append_all<std::uint64_t>(bytes, {vertices, triangles});
+  return bytes;
+}
+
+/// One triangle (0, 0, 0), (size, 0, 0), (0, size, 0).
+std::string one_triangle(std::uint16_t version, float size) {
+  std::string bytes = mesh_preamble(version, 0x1000, 3, 1);
+  append_all<float>(bytes, {0, 0, 0, size, 0, 0, 0, size, 0});
+  append_all<std::uint32_t>(bytes, {0, 1, 2});
+  return mesh_header(version) + compress_bytes(bytes);
+}
+
+template <class Offset>
+std::string join_meshes(const std::vector<std::string>& meshes) {
+  std::string bytes, offsets;
+  for (const std::string& mesh : meshes) {
+    append(offsets, static_cast<Offset>(bytes.size()));
+    bytes += mesh;
+  }
+  append(offsets, static_cast<std::uint32_t>(meshes.size()));
+  return bytes + offsets;
+}
+
+std::string shape_index(int index) {
+  return "<integer name=\"shapeIndex\" value=\"" + std::to_string(index) + "\"/>";
+}
+
+TEST(SerializedFile, ReadsSinglePrecision) {
+  const TriangleMesh mesh = load_mesh("serialized", one_triangle(4, 2.0F));
+  ASSERT_EQ(mesh.triangles.size(), 1U);
+  expect_near(mesh.positions.at(1), Eigen::Vector3f(2, 0, 0));
+  expect_near(mesh.normals.at(0), Eigen::Vector3f(0, 0, 1));  // computed
+  EXPECT_TRUE(mesh.uvs.empty());
+}
+
+TEST(SerializedFile, ReadsDoublePrecisionWithAllArrays) {
+  std::string bytes = mesh_preamble(4, 0x2000 | 0x1 | 0x2 | 0x8, 3, 1);
+  append_all<double>(bytes, {0, 0, 0, 1, 0, 0, 0, 1, 0});
+  append_all<double>(bytes, {0, 0, -1, 0, 0, -1, 0, 0, -1});
+  append_all<double>(bytes, {0.1, 0.2, 0.3, 0.4, 0.5, 0.6});
+  append_all<double>(bytes, {7, 7, 7, 7, 7, 7, 7, 7, 7});
+  append_all<std::uint32_t>(bytes, {2, 1, 0});
+  const TriangleMesh mesh = load_mesh("serialized", mesh_header(4) + compress_bytes(bytes));
+  expect_near(mesh.normals.at(2), Eigen::Vector3f(0, 0, -1));
+  expect_near(mesh.uvs.at(1), Eigen::Vector2f(0.3F, 0.4F));
+  EXPECT_EQ(mesh.triangles.at(0), (std::array<std::uint32_t, 3>{2, 1, 0}));
+}
+
+TEST(SerializedFile, FindsMeshesByIndex) {
+  for (const std::uint16_t version : {std::uint16_t{3}, std::uint16_t{4}}) {
+    const std::vector<std::string> meshes{one_triangle(version, 1), one_triangle(version, 2),
+                                          one_triangle(version, 3)};
+    const std::string file =
+        version == 4 ? join_meshes<std::uint64_t>(meshes) : join_meshes<std::uint32_t>(meshes);
+    for (int i = 0; i < 3; ++i) {
+      const TriangleMesh mesh = load_mesh("serialized", file, shape_index(i));
+      EXPECT_EQ(mesh.positions.at(1).x(), static_cast<float>(i + 1)) << "version " << version;
+    }
+    expect_contains(mesh_error("serialized", file, shape_index(3)), "no mesh 3");
+    expect_contains(mesh_error("serialized", file, shape_index(-1)), "negative");
+  }
+}
+
+TEST(SerializedFile, MirroringKeepsTheOutside) {
+  const TriangleMesh mesh =
+      load_mesh("serialized", one_triangle(4, 1), transform(R"(<scale x="-1"/>)"));
+  expect_near(mesh.normals.at(0), Eigen::Vector3f(0, 0, 1));
+  expect_near(winding_normal(mesh, 0), Eigen::Vector3f(0, 0, 1));
+}
+
+TEST(SerializedFile, RefusesTruncatedFiles) {
+  const std::string file = one_triangle(4, 1);
+  for (const std::size_t size : {std::size_t{0}, std::size_t{3}, std::size_t{4}, std::size_t{20},
+                                 file.size() - 6})
+    expect_contains(mesh_error("serialized", file.substr(0, size)), "truncated");
+}
+
+TEST(SerializedFile, RefusesCorruptFiles) {
+  const std::string file = one_triangle(4, 1);
+  std::string changed = file;
+  changed[0] = 'x';
+  expect_contains(mesh_error("serialized", changed), "header");
+  changed = file;
+  changed[2] = 7;
+  expect_contains(mesh_error("serialized", changed), "version 7");
+  changed = file;
+  changed[4] = '\x55';
+  expect_contains(mesh_error("serialized", changed), "corrupt");
+
+  std::string beyond = mesh_preamble(4, 0x1000, 3, 1);
+  append_all<float>(beyond, {0, 0, 0, 1, 0, 0, 0, 1, 0});
+  append_all<std::uint32_t>(beyond, {0, 1, 3});
+  expect_contains(mesh_error("serialized", mesh_header(4) + compress_bytes(beyond)), "vertex 3");
+}
+
+TEST(SerializedFile, RefusesImpossibleCountsBeforeItAllocates) {
+  const auto file = [](std::uint64_t vertices, std::uint64_t triangles) {
+    std::string bytes = mesh_preamble(4, 0x1000, vertices, triangles);
+    append_all<float>(bytes, {0, 0, 0, 1, 0, 0, 0, 1, 0});
+    return mesh_header(4) + compress_bytes(bytes);
+  };
+  const std::uint64_t huge = std::uint64_t{1} << 62U;
+  expect_contains(mesh_error("serialized", file(huge, 1)), "corrupt");
+  expect_contains(mesh_error("serialized", file(3, huge)), "corrupt");
+  expect_contains(mesh_error("serialized", file(0, 0)), "no triangles");
+}
+
+}  // namespace
+}  // namespace driftlight

@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: Apache-2.0
+/// BSDFs, colours, textures and emitters of scene files.
+#include <OpenImageIO/imageio.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "driftlight/scene_file.h"
+#include "support/scene_directory.h"
+
+namespace driftlight {
+namespace {
+
+using test::expect_near;
+using test::kShape;
+using test::lit;
+using test::SceneDirectory;
+using test::with_sensor;
+
+constexpr double kAir = 1.000277;
+
+/// The BSDF of the only shape.
+Bsdf load_bsdf(const std::string& bsdf) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(lit("<shape type=\"sphere\">" + bsdf + "</shape>"));
+  EXPECT_EQ(loaded.scene.bsdfs().size(), 1U);
+  return loaded.scene.bsdfs()[0];
+}
+
+TEST(BsdfsXml, ReadsDiffuse) {
+  const Bsdf bsdf =
+      load_bsdf(R"(<bsdf type="diffuse"><rgb name="reflectance" value="0.1, .2 0.3"/></bsdf>)");
+  expect_near(std::get<Diffuse>(bsdf).reflectance.color, Rgbd(0.1, 0.2, 0.3));
+}
+
+TEST(BsdfsXml, ReadsRoughConductors) {
+  const auto metal = std::get<RoughConductor>(load_bsdf(
+      R"(<bsdf type="roughconductor"><string name="distribution" value="ggx"/>
+         <float name="alpha" value="0.05"/><boolean name="sampleVisible" value="false"/>
+         <rgb name="eta" value="0.2, 0.4, 1.4"/><rgb name="k" value="4, 2, 1.6"/>
+         <float name="extEta" value="2"/><rgb name="specularReflectance" value="0.9"/></bsdf>)"));
+  EXPECT_EQ(metal.microfacets.distribution, Distribution::Ggx);
+  EXPECT_EQ(metal.microfacets.alpha, 0.05);
+  expect_near(metal.eta, Rgbd(0.1, 0.2, 0.7));
+  expect_near(metal.k, Rgbd(2, 1, 0.8));
+  expect_near(metal.specular_reflectance.color, Rgbd(0.9, 0.9, 0.9));
+}
+
+TEST(BsdfsXml, TheDefaultMetalIsCopperInAir) {
+  const auto copper = std::get<RoughConductor>(load_bsdf(R"(<bsdf type="roughconductor"/>)"));
+  EXPECT_EQ(copper.microfacets.distribution, Distribution::Beckmann);
+  EXPECT_EQ(copper.microfacets.alpha, 0.1);
+  const auto named = std::get<Conductor>(
+      load_bsdf(R"(<bsdf type="conductor"><string name="material" value="cu"/></bsdf>)"));
+  expect_near(copper.eta, named.eta, 0.0);
+  // Red is reflected best: the index falls and the extinction grows from blue to red.
+  EXPECT_LT(copper.eta.x(), copper.eta.z());
+  EXPECT_GT(copper.k.x(), copper.k.z());
+}
+
+TEST(BsdfsXml, KnowsPerfectMirrors) {
+  const auto mirror = std::get<Conductor>(
+      load_bsdf(R"(<bsdf type="conductor"><string name="material" value="none"/></bsdf>)"));
+  expect_near(mirror.eta, Rgbd(0, 0, 0));
+  expect_near(mirror.k, Rgbd(Rgbd::Constant(1 / kAir)));
+}
+
+TEST(BsdfsXml, EveryNamedMetalReflectsLikeAMetal) {
+  for (const std::string name : {"Ag", "Al", "Au", "Cr", "Cu", "W"}) {
+    const auto metal = std::get<Conductor>(load_bsdf(
+        R"(<bsdf type="conductor"><string name="material" value=")" + name + R"("/></bsdf>)"));
+    const double reflectance = fresnel_conductor(1.0, metal.eta, metal.k).x();
+    EXPECT_GT(reflectance, name == "W" ? 0.45 : 0.6) << name;
+    EXPECT_LT(reflectance, 1.0) << name;
+  }
+}
+
+TEST(BsdfsXml, ReadsDielectrics) {
+  const auto window = std::get<Dielectric>(load_bsdf(R"(<bsdf type="dielectric"/>)"));
+  EXPECT_NEAR(window.eta, 1.5046 / kAir, 1e-12);
+  const auto gem = std::get<Dielectric>(load_bsdf(
+      R"(<bsdf type="dielectric"><string name="intIOR" value="Diamond"/>
+         <float name="extIOR" value="1.5"/>
+         <rgb name="specularTransmittance" value="0.1, 0.2, 0.3"/></bsdf>)"));
+  EXPECT_NEAR(gem.eta, 2.419 / 1.5, 1e-12);
+  expect_near(gem.specular_transmittance.color, Rgbd(0.1, 0.2, 0.3));
+  expect_near(gem.specular_reflectance.color, Rgbd(1, 1, 1));
+}
+
+TEST(BsdfsXml, ReadsRoughDielectrics) {
+  const auto glass = std::get<RoughDielectric>(load_bsdf(
+      R"(<bsdf type="roughdielectric"><float name="alphaU" value="0.3"/>
+         <float name="alphaV" value="0.3"/></bsdf>)"));
+  EXPECT_EQ(glass.microfacets.alpha, 0.3);
+  EXPECT_NEAR(glass.eta, 1.5046 / kAir, 1e-12);
+}
+
+TEST(BsdfsXml, ReadsPhong) {
+  const std::string colors = R"(<rgb name="diffuseReflectance" value="0.6, 0.1, 0"/>
+                                <rgb name="specularReflectance" value="0.6, 0.2, 0.3"/>)";
+  const auto scaled =
+      std::get<Phong>(load_bsdf("<bsdf type=\"phong\">" + colors + "</bsdf>"));
+  EXPECT_EQ(scaled.exponent, 30);
+  const double factor = 0.99 / 1.2;
+  expect_near(scaled.diffuse_reflectance.color, Rgbd(factor * Rgbd(0.6, 0.1, 0)));
+  expect_near(scaled.specular_reflectance.color, Rgbd(factor * Rgbd(0.6, 0.2, 0.3)));
+  const auto kept = std::get<Phong>(load_bsdf(
+      "<bsdf type=\"phong\"><boolean name=\"ensureEnergyConservation\" value=\"false\"/>" +
+      colors + "</bsdf>"));
+  expect_near(kept.specular_reflectance.color, Rgbd(0.6, 0.2, 0.3));
+}
+
+TEST(BsdfsXml, ScalesReflectanceAboveOneAndSaysSo) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(lit(
+      R"(<shape type="sphere"><bsdf type="diffuse"><rgb name="reflectance" value="2, 1, 0"/></bsdf>
+         </shape>)"));
+  expect_near(std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance.color,
+              Rgbd(0.99, 0.495, 0));
+  EXPECT_EQ(loaded.notices.size(), 1U);
+}
+
+TEST(BsdfsXml, OpaqueBsdfsHaveNoBackUnlessTwoSided) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(lit(
+      R"(<bsdf type="diffuse" id="red"><rgb name="reflectance" value="1, 0, 0"/></bsdf>
+         <shape type="sphere"><ref id="red"/></shape>
+         <shape type="sphere"><bsdf type="twosided"><ref id="red"/></bsdf></shape>
+         <shape type="sphere"><bsdf type="twosided"><bsdf type="phong"/><ref id="red"/></bsdf>
+         </shape>)"));
+  const auto material = [&](std::size_t shape) {
+    return loaded.scene.materials()[loaded.scene.shapes()[shape].material];
+  };
+  const auto& bsdfs = loaded.scene.bsdfs();
+  EXPECT_FALSE(material(0).back.has_value());
+  ASSERT_TRUE(material(1).back.has_value());
+  EXPECT_TRUE(std::holds_alternative<Diffuse>(bsdfs[*material(1).back]));
+  ASSERT_TRUE(material(2).back.has_value());
+  EXPECT_TRUE(std::holds_alternative<Phong>(bsdfs[material(2).front]));
+  EXPECT_TRUE(std::holds_alternative<Diffuse>(bsdfs[*material(2).back]));
+}
+
+TEST(BsdfsXml, ShapesShareReferredMaterials) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(lit(
+      R"(<bsdf type="diffuse" id="a"/><bsdf type="diffuse" id="unused"/>
+         <shape type="sphere"><ref id="a"/></shape><shape type="sphere"><ref id="a"/></shape>)"));
+  EXPECT_EQ(loaded.scene.bsdfs().size(), 1U);
+  EXPECT_EQ(loaded.scene.shapes()[0].material, loaded.scene.shapes()[1].material);
+}
+
+
+TEST(ColorXml, ReadsEveryNotation) {
+  const auto color = [](const std::string& element) {
+    return std::get<Diffuse>(load_bsdf("<bsdf type=\"diffuse\">" + element + "</bsdf>"))
+        .reflectance.color;
+  };
+  expect_near(color(R"(<rgb name="reflectance" value="0.4"/>)"), Rgbd(0.4, 0.4, 0.4));
+  expect_near(color(R"(<rgb name="reflectance" value="#3366ff"/>)"), Rgbd(0.2, 0.4, 1));
+  expect_near(color(R"(<srgb name="reflectance" value="0.5, 0, 1"/>)"), Rgbd(0.2140411, 0, 1),
+              1e-6);
+  expect_near(color(R"(<spectrum name="reflectance" value="0.7"/>)"), Rgbd(0.7, 0.7, 0.7));
+  expect_near(color(R"(<spectrum name="reflectance" value=".1 .2 .3"/>)"), Rgbd(0.1, 0.2, 0.3));
+  expect_near(color(R"(<spectrum name="reflectance" value="360:0.5, 830:0.5"/>)"),
+              Rgbd(0.6024, 0.4742, 0.4544), 5e-4);
+}
+
+
+TEST(EmittersXml, ReadsAreaEmitters) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(with_sensor(
+      R"(<shape type="sphere"/><shape type="sphere"><emitter type="area">
+         <rgb name="radiance" value="1, 2, 3"/><float name="samplingWeight" value="2"/></emitter>
+         </shape>)"));
+  ASSERT_EQ(loaded.scene.emitters().size(), 1U);
+  const auto& area = std::get<AreaEmitter>(loaded.scene.emitters()[0]);
+  expect_near(area.radiance, Rgbd(1, 2, 3));
+  EXPECT_EQ(area.shape, 1U);
+}
+
+TEST(EmittersXml, ReadsPoints) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(with_sensor(
+      R"(<emitter type="point"><point name="position" x="1" y="2" z="3"/>
+         <spectrum name="intensity" value="4"/></emitter>
+         <emitter type="point"><transform name="toWorld"><translate x="5"/></transform></emitter>
+         <shape type="sphere"/>)"));
+  const auto& first = std::get<PointEmitter>(loaded.scene.emitters()[0]);
+  expect_near(first.position, Vec3d(1, 2, 3));
+  expect_near(first.intensity, Rgbd(4, 4, 4));
+  const auto& second = std::get<PointEmitter>(loaded.scene.emitters()[1]);
+  expect_near(second.position, Vec3d(5, 0, 0));
+  expect_near(second.intensity, Rgbd(1, 1, 1));
+}
+
+TEST(EmittersXml, ReadsConstants) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(with_sensor(
+      kShape + R"(<emitter type="constant"><rgb name="radiance" value="0.5"/></emitter>)"));
+  expect_near(std::get<ConstantEnvironment>(loaded.scene.emitters()[0]).radiance,
+              Rgbd(0.5, 0.5, 0.5));
+}
+
+
+/// Writes an image of three channels.
+template <class T>
+void write_image(const std::filesystem::path& file, int width, int height,
+                 const std::vector<T>& values, OIIO::TypeDesc type) {
+  const auto output = OIIO::ImageOutput::create(file.string());
+  ASSERT_TRUE(output);
+  ASSERT_TRUE(output->open(file.string(), OIIO::ImageSpec(width, height, 3, type)));
+  ASSERT_TRUE(output->write_image(type, values.data()));
+  ASSERT_TRUE(output->close());
+}
+
+TEST(EmittersXml, ReadsEnvironmentMaps) {
+  const SceneDirectory directory;
+  // Two rows of four texels; only the one at x = 2 of the upper row is lit: directions around
+  // u = 0.625, that is atan2(x, -z) = -3/8 of a turn, or -x, +z, above the horizon.
+  std::vector<float> texels(24, 0.0F);
+  texels[6] = 1.0F;
+  write_image(directory.path() / "sky.exr", 4, 2, texels, OIIO::TypeDesc::FLOAT);
+  const LoadedScene loaded = directory.load(with_sensor(
+      kShape + R"(<emitter type="envmap"><string name="filename" value="sky.exr"/>
+         <float name="scale" value="3"/><transform name="toWorld"><rotate y="1" angle="90"/>
+         <translate x="7"/></transform></emitter>)"));
+  const auto& sky = std::get<EnvironmentMap>(loaded.scene.emitters()[0]);
+  const double sine = std::sqrt(0.5);
+  const Vec3d in_map = Vec3d(-sine * sine, sine, sine * sine);
+  const Vec3d in_world(in_map.z(), in_map.y(), -in_map.x());  // turned by 90 degrees about y
+  expect_near(sky.eval(in_world), Rgbd(3, 0, 0), 1e-6);
+}
+
+TEST(TexturesXml, ReadsBitmapsFromTheTopAndUndoesTheirGamma) {
+  const SceneDirectory directory;
+  write_image<unsigned char>(directory.path() / "two.png", 1, 2, {128, 0, 255, 64, 64, 64},
+                             OIIO::TypeDesc::UINT8);
+  const auto texture = [&](const std::string& properties) {
+    const LoadedScene loaded = directory.load(lit(
+        R"(<texture type="bitmap" id="t"><string name="filename" value="two.png"/>)" + properties +
+        R"(</texture><shape type="sphere"><bsdf type="diffuse"><ref name="reflectance" id="t"/>
+           </bsdf></shape>)"));
+    return std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance;
+  };
+  const double encoded = 128.0 / 255.0;
+  const Texture srgb = texture("");
+  EXPECT_NEAR(srgb.bitmap->at(0, 0).x(), std::pow((encoded + 0.055) / 1.055, 2.4), 1e-6);
+  EXPECT_FLOAT_EQ(srgb.bitmap->at(0, 0).z(), 1.0F);
+  EXPECT_EQ(srgb.bitmap->at(0, 1).x(), srgb.bitmap->at(0, 1).z());
+  const Texture power = texture(R"(<float name="gamma" value="2.2"/>
+      <float name="uvscale" value="4"/><float name="vscale" value="5"/>
+      <float name="uoffset" value="0.5"/>)");
+  EXPECT_NEAR(power.bitmap->at(0, 0).x(), std::pow(encoded, 2.2), 1e-6);
+  expect_near(power.uv_scale, Vec2d(4, 5));
+  expect_near(power.uv_offset, Vec2d(0.5, 0));
+}
+
+TEST(TexturesXml, FloatImagesAreLinearAndScaledWhenTooBright) {
+  const SceneDirectory directory;
+  write_image<float>(directory.path() / "bright.exr", 1, 1, {0.5F, 1.0F, 2.0F},
+                     OIIO::TypeDesc::FLOAT);
+  const LoadedScene loaded = directory.load(lit(
+      R"(<shape type="sphere"><bsdf type="diffuse"><texture type="bitmap" name="reflectance">
+         <string name="filename" value="bright.exr"/><string name="filterType" value="bilinear"/>
+         </texture></bsdf></shape>)"));
+  const Texture& texture = std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance;
+  EXPECT_FLOAT_EQ(texture.bitmap->at(0, 0).x(), 0.5F);
+  EXPECT_NEAR(texture.scale, 0.99 / 2.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace driftlight

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "driftlight/scene_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "support/scene_directory.h"
+
+namespace driftlight {
+namespace {
+
+using test::complete;
+using test::expect_near;
+using test::kEmitter;
+using test::kShape;
+using test::lit;
+using test::scene_file;
+using test::SceneDirectory;
+
+std::string sensor(const std::string& properties, int width = 200, int height = 100) {
+  return R"(<sensor type="perspective">)" + properties + R"(<film type="hdrfilm">)" +
+         R"(<integer name="width" value=")" + std::to_string(width) + R"("/>)" +
+         R"(<integer name="height" value=")" + std::to_string(height) + R"("/>)" +
+         R"(<rfilter type="box"/></film></sensor>)";
+}
+
+PerspectiveCamera load_camera(const std::string& properties, int width = 200, int height = 100) {
+  const SceneDirectory directory;
+  const std::string text = scene_file(sensor(properties, width, height) + kEmitter + kShape);
+  return directory.load(text).scene.camera();
+}
+
+// --- The file ------------------------------------------------------------------------------------
+
+TEST(SceneFile, ReadsThePartsOfAScene) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(complete(""));
+  EXPECT_EQ(loaded.scene.shapes().size(), 1U);
+  EXPECT_EQ(loaded.scene.emitters().size(), 1U);
+  EXPECT_EQ(loaded.scene.camera().film_width, 200);
+  EXPECT_EQ(loaded.scene.camera().film_height, 100);
+  EXPECT_TRUE(loaded.notices.empty());
+}
+
+TEST(SceneFile, SubstitutesDefaults) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(
+      lit(R"(<default name="r" value="2.5"/><default name="rough" value="ignored"/>
+             <shape type="sphere"><float name="radius" value="$r"/></shape>)"));
+  EXPECT_EQ(std::get<Sphere>(loaded.scene.shapes()[0].geometry).radius, 2.5);
+}
+
+TEST(SceneFile, UserDefinitionsWinOverDefaults) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(
+      lit(R"(<default name="r" value="2.5"/>
+             <shape type="sphere"><float name="radius" value="1$r"/></shape>)"),
+      {{{"r", "7"}}});
+  EXPECT_EQ(std::get<Sphere>(loaded.scene.shapes()[0].geometry).radius, 17);
+}
+
+TEST(SceneFile, TheLongestNameIsSubstituted) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(
+      lit(R"(<default name="rad" value="1"/>
+             <shape type="sphere"><float name="radius" value="$radius2"/></shape>)"),
+      {{{"radius", "3"}}});
+  EXPECT_EQ(std::get<Sphere>(loaded.scene.shapes()[0].geometry).radius, 32);
+}
+
+TEST(SceneFile, ValuesAreNotSubstitutedAgain) {
+  const SceneDirectory directory;
+  const auto load = [&] {
+    directory.load(lit(R"(<shape type="sphere"><float name="radius" value="$a"/></shape>)"),
+                   {{{"a", "$a$a"}}});
+  };
+  EXPECT_THROW(load(), SceneError);  // "$a$a" is no number, and grows no further
+}
+
+TEST(SceneFile, IncludesOtherFilesInPlace) {
+  const SceneDirectory directory;
+  directory.write("materials.xml", scene_file(R"(<bsdf type="diffuse" id="m">
+      <rgb name="reflectance" value="0.1"/></bsdf><default name="r" value="3"/>)"));
+  const LoadedScene loaded = directory.load(
+      lit(R"(<include filename="materials.xml"/>
+             <shape type="sphere"><ref id="m"/><float name="radius" value="$r"/></shape>)"));
+  EXPECT_EQ(std::get<Sphere>(loaded.scene.shapes()[0].geometry).radius, 3);
+  expect_near(std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance.color,
+              Rgbd::Constant(0.1).eval());
+}
+
+TEST(SceneFile, KeepsTheDepthOfIntegrators) {
+  const SceneDirectory directory;
+  const auto depth = [&](const std::string& value) {
+    return directory
+        .load(complete(R"(<integrator type="path"><integer name="maxDepth" value=")" + value +
+                       R"("/><integer name="rrDepth" value="5"/></integrator>)"))
+        .max_depth;
+  };
+  EXPECT_EQ(depth("8"), 8);
+  EXPECT_EQ(depth("-1"), std::nullopt);
+}
+
+TEST(SceneFile, SaysWhichIntegratorIsNotOurs) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(complete(
+      R"(<integrator type="bdpt"><integer name="maxDepth" value="3"/>
+         <boolean name="strictNormals" value="true"/></integrator>)"));
+  EXPECT_EQ(loaded.max_depth, 3);
+  ASSERT_EQ(loaded.notices.size(), 1U);
+  EXPECT_NE(loaded.notices[0].find("scene.xml:2:1: integrator 'bdpt' is not driftlight's"),
+            std::string::npos);
+}
+
+TEST(SceneFile, KeepsTheDepthOfForeignBlocks) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(complete(
+      R"(<dpt><string name="integrator" value="mcmc"/><integer name="maxdepth" value="8"/></dpt>)"));
+  EXPECT_EQ(loaded.max_depth, 8);
+  ASSERT_EQ(loaded.notices.size(), 1U);
+  EXPECT_NE(loaded.notices[0].find("<dpt>"), std::string::npos);
+}
+
+// --- The sensor ----------------------------------------------------------------------------------
+
+TEST(SensorXml, LooksAlongZWithXOnTheLeft) {
+  const PerspectiveCamera camera = load_camera(R"(<float name="fov" value="60"/>)");
+  expect_near(camera.right, Vec3d(-1, 0, 0));
+  expect_near(camera.up, Vec3d(0, 1, 0));
+  expect_near(camera.forward, Vec3d(0, 0, 1));
+  EXPECT_EQ(camera.near_clip, 1e-2);
+  EXPECT_EQ(camera.far_clip, 1e4);
+}
+
+TEST(SensorXml, LooksAtItsTarget) {
+  const PerspectiveCamera camera = load_camera(
+      R"(<float name="fov" value="60"/><float name="nearClip" value="2"/>
+         <float name="farClip" value="50"/><float name="focusDistance" value="7"/>
+         <transform name="toWorld">
+           <lookAt origin="1, 2, 3" target="1, 2, -5" up="0, 3, 1"/></transform>)");
+  expect_near(camera.origin, Vec3d(1, 2, 3));
+  expect_near(camera.forward, Vec3d(0, 0, -1));
+  expect_near(camera.up, Vec3d(0, 1, 0));
+  expect_near(camera.right, Vec3d(1, 0, 0));
+  EXPECT_EQ(camera.near_clip, 2);
+  EXPECT_EQ(camera.far_clip, 50);
+}
+
+TEST(SensorXml, MeasuresTheFieldOfViewAlongItsAxis) {
+  const auto camera = [](const std::string& axis, int width, int height) {
+    return load_camera(R"(<float name="fov" value="60"/><string name="fovAxis" value=")" + axis +
+                           R"("/>)",
+                       width, height);
+  };
+  const double half = std::tan(kPi / 6.0);
+  EXPECT_NEAR(camera("x", 200, 100).half_width, half, 1e-12);
+  EXPECT_NEAR(camera("x", 200, 100).half_height, half / 2, 1e-12);
+  EXPECT_NEAR(camera("y", 200, 100).half_height, half, 1e-12);
+  EXPECT_NEAR(camera("smaller", 200, 100).half_height, half, 1e-12);
+  EXPECT_NEAR(camera("smaller", 100, 200).half_width, half, 1e-12);
+  EXPECT_NEAR(camera("larger", 200, 100).half_width, half, 1e-12);
+  EXPECT_NEAR(camera("larger", 100, 200).half_height, half, 1e-12);
+  const PerspectiveCamera diagonal = camera("diagonal", 200, 100);
+  EXPECT_NEAR(std::hypot(diagonal.half_width, diagonal.half_height), half, 1e-12);
+}
+
+TEST(SensorXml, KnowsFocalLengths) {
+  const auto diagonal = [](const std::string& properties) {
+    const PerspectiveCamera camera = load_camera(properties);
+    return std::hypot(camera.half_width, camera.half_height);
+  };
+  const double film = std::hypot(36.0, 24.0);
+  EXPECT_NEAR(diagonal(""), film / 100.0, 1e-12);
+  EXPECT_NEAR(diagonal(R"(<string name="focalLength" value="25mm"/>)"), film / 50.0, 1e-12);
+}
+
+// --- Scenes of others ----------------------------------------------------------------------------
+
+#ifdef DRIFTLIGHT_SHARED_DIR
+class SharedScene : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(SharedScene, LoadsUnchanged) {
+  const auto file = std::filesystem::path(DRIFTLIGHT_SHARED_DIR) / "scenes" / GetParam();
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not on this machine";
+  const LoadedScene loaded = load_scene(file);
+  EXPECT_GE(loaded.scene.shapes().size(), 5U);
+  EXPECT_EQ(loaded.scene.emitters().size(), 1U);
+  EXPECT_TRUE(loaded.max_depth == 8 || loaded.max_depth == 10);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, SharedScene,
+                         ::testing::Values("cbox/scene.xml", "cbox_glossy/scene.xml",
+                                           "torus/scene.xml", "torus/lmc.xml"));
+#endif
+
+}  // namespace
+}  // namespace driftlight

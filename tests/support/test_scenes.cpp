@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "support/test_scenes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "driftlight/contribution.h"
+
+namespace driftlight::test {
+
+// ---- Parts ------------------------------------------------------------------------------------
+
+TriangleMesh quad(const Vec3d& corner, const Vec3d& u, const Vec3d& v, bool uvs, double bend) {
+  TriangleMesh mesh;
+  for (const Vec2d& s : {Vec2d(0, 0), Vec2d(1, 0), Vec2d(1, 1), Vec2d(0, 1)}) {
+    mesh.positions.push_back((corner + s.x() * u + s.y() * v).cast<float>());
+    if (uvs) mesh.uvs.push_back(s.cast<float>());
+    if (bend != 0.0) {
+      const Vec3d tilt = (2.0 * s.x() - 1.0) * u.normalized() + (2.0 * s.y() - 1.0) * v.normalized();
+      const Vec3d n = u.cross(v).normalized() + bend * tilt;
+      mesh.normals.push_back(n.normalized().cast<float>());
+    }
+  }
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  return mesh;
+}
+
+TriangleMesh round_mesh(const Vec3d& center, double radius, int rings, bool normals) {
+  TriangleMesh mesh;
+  const int sectors = 2 * rings;
+  const auto index = [&](int ring, int sector) {
+    return static_cast<std::uint32_t>(ring * sectors + sector % sectors);
+  };
+  for (int ring = 0; ring <= rings; ++ring) {
+    for (int sector = 0; sector < sectors; ++sector) {
+      const double theta = kPi * ring / rings;
+      const double phi = 2.0 * kPi * sector / sectors;
+      const Vec3d n(std::sin(theta) * std::cos(phi), std::cos(theta),
+                    std::sin(theta) * std::sin(phi));
+      mesh.positions.push_back((center + radius * n).cast<float>());
+      if (normals) mesh.normals.push_back(n.cast<float>());
+      mesh.uvs.emplace_back(static_cast<float>(sector) / static_cast<float>(sectors),
+                            static_cast<float>(ring) / static_cast<float>(rings));
+      if (ring == rings) continue;
+      if (ring > 0)
+        mesh.triangles.push_back(
+            {index(ring, sector), index(ring, sector + 1), index(ring + 1, sector)});
+      if (ring + 1 < rings)
+        mesh.triangles.push_back(
+            {index(ring, sector + 1), index(ring + 1, sector + 1), index(ring + 1, sector)});
+    }
+  }
+  return mesh;
+}
+
+TriangleMesh box(const Vec3d& low, const Vec3d& high) {
+  TriangleMesh mesh;
+  for (int i = 0; i < 8; ++i)
+    mesh.positions.push_back(Vec3d((i & 1) != 0 ? high.x() : low.x(),
+                                   (i & 2) != 0 ? high.y() : low.y(),
+                                   (i & 4) != 0 ? high.z() : low.z())
+                                 .cast<float>());
+  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  return mesh;
+}
+
+PerspectiveCamera look_at(const Vec3d& origin, const Vec3d& target, double half_width) {
+  PerspectiveCamera camera;
+  camera.origin = origin;
+  camera.forward = (target - origin).normalized();
+  camera.right = camera.forward.cross(Vec3d::UnitY()).normalized();
+  camera.up = camera.right.cross(camera.forward);
+  camera.half_width = half_width;
+  camera.half_height = half_width;
+  camera.film_width = 16;
+  camera.film_height = 16;
+  return camera;
+}
+
+std::shared_ptr<const Bitmap> pattern_bitmap(int width, int height, double low, double high) {
+  auto bitmap = std::make_shared<Bitmap>();
+  bitmap->width = width;
+  bitmap->height = height;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double a = std::sin(2.0 * kPi * x / width);
+      const double b = std::cos(2.0 * kPi * y / height);
+      const Rgbd c{0.5 + 0.5 * a * b, 0.5 + 0.5 * b, 0.5 + 0.25 * (a + b)};
+      bitmap->texels.emplace_back((low + (high - low) * c).cast<float>());
+    }
+  }
+  return bitmap;
+}
+
+Bitmap sun_bitmap(int width, int height, float sun) {
+  Bitmap bitmap = *pattern_bitmap(width, height, 0.2, 1.0);
+  const int y = height / 4;
+  const int x = width / 3;
+  for (const int i : {0, 1})
+    for (const int j : {0, 1})
+      bitmap.texels[static_cast<std::size_t>((y + j) * width + x + i)] *= sun;
+  return bitmap;
+}
+
+Scene furnace(double albedo) {
+  SceneBuilder builder;
+  const auto white = builder.add_bsdf(Diffuse{Texture(Rgbd::Constant(albedo))});
+  const auto material = builder.add_material({white, std::nullopt});
+  Sphere sphere;
+  sphere.center = {0.1, -0.2, 0.3};
+  sphere.radius = 1.5;
+  sphere.flip_normals = true;
+  builder.add_shape(sphere, material, Rgbd::Ones());
+  builder.set_camera(look_at({0.4, 0.2, -0.3}, {0, 0, 1}, 0.8));
+  return builder.build();
+}
+
+// ---- Scenes -----------------------------------------------------------------------------------
+
+namespace {
+
+constexpr double kGlass = 1.5;
+const Rgbd kGoldEta{0.143, 0.375, 1.442};
+const Rgbd kGoldK{3.983, 2.386, 1.603};
+
+Texture textured(int size, double low, double high) {
+  Texture texture;
+  texture.bitmap = pattern_bitmap(size, size, low, high);
+  texture.uv_scale = {2.0, 1.5};
+  texture.uv_offset = {0.13, 0.29};
+  return texture;
+}
+
+Texture gray(double value) { return Texture(Rgbd{value, 0.9 * value, 0.8 * value}); }
+
+Sphere sphere_at(const Vec3d& center, double radius) {
+  Sphere sphere;
+  sphere.center = center;
+  sphere.radius = radius;
+  return sphere;
+}
+
+/// A builder that makes a material of each BSDF it is given.
+class Workshop {
+ public:
+  std::uint32_t one_sided(Bsdf bsdf) {
+    return builder_.add_material({builder_.add_bsdf(std::move(bsdf)), std::nullopt});
+  }
+  std::uint32_t two_sided(Bsdf front, Bsdf back) {
+    const auto f = builder_.add_bsdf(std::move(front));
+    return builder_.add_material({f, builder_.add_bsdf(std::move(back))});
+  }
+  SceneBuilder* operator->() { return &builder_; }
+
+ private:
+  SceneBuilder builder_;
+};
+
+Microfacets beckmann(double alpha) { return {Distribution::Beckmann, alpha}; }
+Microfacets ggx(double alpha) { return {Distribution::Ggx, alpha}; }
+
+/// Walls of the room [-2, 2] x [0, 3] x [-2, 2], seen from its front.
+void add_walls(Workshop& make, std::uint32_t floor, std::uint32_t back, std::uint32_t side) {
+  make->add_shape(quad({-2, 0, 2}, {4, 0, 0}, {0, 0, -4}, true), floor);
+  make->add_shape(quad({-2, 0, -2}, {4, 0, 0}, {0, 3, 0}, true, 0.1), back);
+  make->add_shape(quad({-2, 0, 2}, {0, 0, -4}, {0, 3, 0}), side);
+  make->add_shape(quad({2, 0, -2}, {0, 0, 4}, {0, 3, 0}), side);
+}
+
+Scene room() {
+  Workshop make;
+  const auto plain = make.one_sided(Diffuse{gray(0.7)});
+  const auto floor = make.one_sided(Phong{textured(8, 0.1, 0.5), textured(4, 0.1, 0.4), 12});
+  const auto back = make.one_sided(Diffuse{textured(8, 0.2, 0.8)});
+  add_walls(make, floor, back, plain);
+  make->add_shape(quad({-2, 3, -2}, {4, 0, 0}, {0, 0, 4}), plain);
+  // A screen whose two sides differ, hung so that both are seen and lit.
+  const auto screen = make.two_sided(Diffuse{gray(0.6)}, RoughConductor{ggx(0.3)});
+  make->add_shape(quad({-1.2, 0.6, 0.8}, {0.8, 0, -0.5}, {0, 0.9, 0}), screen);
+  const auto back_screen = make.two_sided(Diffuse{gray(0.5)}, RoughConductor{beckmann(0.25)});
+  make->add_shape(quad({0.6, 1.4, 0.4}, {0.9, 0, 0.5}, {0, -0.9, 0}, false, 0.15), back_screen);
+
+  RoughConductor gold{beckmann(0.15), kGoldEta, kGoldK, gray(1.0)};
+  make->add_shape(sphere_at({-0.7, 0.6, -0.7}, 0.6), make.one_sided(gold));
+  RoughConductor etched{ggx(0.2), kGoldEta, kGoldK, textured(8, 0.4, 1.0)};
+  make->add_shape(round_mesh({0.8, 0.6, -0.9}, 0.6, 8), make.one_sided(etched));
+  const auto glossy = make.one_sided(Phong{gray(0.2), gray(0.7), 60});
+  make->add_shape(Disk{{-0.2, 0.02, 1.0}, {0.5, 0, 0}, {0, 0.1, -0.5}}, glossy);
+
+  const auto black = make.one_sided(Diffuse{gray(0.0)});
+  make->add_shape(quad({-0.5, 2.98, -0.5}, {1, 0, 0}, {0, 0, 1}), black, Rgbd{6, 5, 4});
+  make->add_shape(Disk{{-1.98, 1.8, 0.3}, {0, 0.35, 0}, {0, 0, 0.4}}, black, Rgbd{4, 5, 6});
+  make->add_shape(sphere_at({1.4, 2.0, -1.2}, 0.3), plain, Rgbd{5, 5, 3});
+  make->add_shape(round_mesh({-1.3, 1.9, -1.3}, 0.35, 4), plain, Rgbd{3, 4, 5});
+  make->set_camera(look_at({0, 1.4, 3.4}, {0, 1.1, 0}, 0.55));
+  return make->build();
+}
+
+Scene glass() {
+  Workshop make;
+  const auto plain = make.one_sided(Diffuse{gray(0.7)});
+  add_walls(make, plain, make.one_sided(RoughConductor{beckmann(0.3)}), plain);
+  const Texture tint = textured(8, 0.6, 1.0);
+  make->add_shape(sphere_at({-1.0, 0.55, 0.9}, 0.5), make.one_sided(Dielectric{kGlass, tint, tint}));
+  const auto frosted = make.one_sided(RoughDielectric{beckmann(0.15), kGlass, tint, gray(1.0)});
+  make->add_shape(round_mesh({0.0, 0.6, 1.0}, 0.5, 8), frosted);
+  const auto etched = make.one_sided(RoughDielectric{ggx(0.15), kGlass, gray(1.0), tint});
+  make->add_shape(sphere_at({1.0, 0.55, 0.9}, 0.5), etched);
+  const auto mirror = make.one_sided(Conductor{kGoldEta, kGoldK, tint});
+  make->add_shape(round_mesh({-0.6, 1.7, 0.2}, 0.5, 8), mirror);
+  make->add_shape(Disk{{0.9, 1.6, -0.4}, {0.6, 0, 0.1}, {0, 0.6, 0}},
+                  make.one_sided(Conductor{kGoldEta, kGoldK, gray(1.0)}));
+  const auto pane = make.one_sided(RoughDielectric{ggx(0.3), kGlass, gray(1.0), gray(1.0)});
+  make->add_shape(quad({-0.5, 0.1, 1.9}, {1.0, 0, 0.1}, {0, 1.1, 0}, false, 0.1), pane);
+
+  const auto black = make.one_sided(Diffuse{gray(0.0)});
+  make->add_emitter({{1.5, 2.6, 1.2}, {6, 6, 5}});
+  make->add_shape(quad({-1.2, 2.9, -0.4}, {1.6, 0, 0}, {0, 0, 1.6}), black, Rgbd{4, 4, 4});
+  make->add_shape(sphere_at({1.5, 1.0, 1.4}, 0.25), black, Rgbd{8, 7, 6});
+  make->add_shape(round_mesh({-1.5, 1.2, 0.0}, 0.35, 4, false), black, Rgbd{6, 7, 8});
+  make->set_camera(look_at({0, 1.4, 3.6}, {0, 1.0, 0}, 0.5));
+  return make->build();
+}
+
+/// Glossy things on a floor, and a window before the camera.
+void add_yard(Workshop& make, const Bsdf& window) {
+  const Texture tint = textured(8, 0.5, 1.0);
+  make->add_shape(quad({-3, 0, 3}, {6, 0, 0}, {0, 0, -6}, true),
+                  make.one_sided(Phong{textured(8, 0.1, 0.5), gray(0.4), 40}));
+  make->add_shape(quad({-3, 0, -3}, {0, 0, 6}, {0, 2, 0}), make.one_sided(Diffuse{gray(0.6)}));
+  make->add_shape(sphere_at({-0.9, 0.5, 0}, 0.5),
+                  make.one_sided(RoughConductor{ggx(0.1), kGoldEta, kGoldK, tint}));
+  make->add_shape(round_mesh({0.3, 0.5, -0.5}, 0.5, 8),
+                  make.one_sided(RoughConductor{beckmann(0.1), kGoldEta, kGoldK, gray(1.0)}));
+  make->add_shape(sphere_at({1.2, 0.5, 0.2}, 0.5), make.one_sided(Diffuse{textured(8, 0.2, 0.8)}));
+  make->add_shape(round_mesh({0.2, 0.35, 0.8}, 0.3, 6),
+                  make.one_sided(RoughDielectric{beckmann(0.2), kGlass, gray(1.0), tint}));
+  make->add_shape(sphere_at({-0.4, 0.3, 1.0}, 0.25),
+                  make.one_sided(Dielectric{kGlass, gray(1.0), gray(1.0)}));
+  make->add_shape(quad({-0.9, 0.1, 1.9}, {0.9, 0, 0}, {0, 1.2, 0}), make.one_sided(window));
+  make->set_camera(look_at({0, 1.2, 3.2}, {0, 0.5, 0}, 0.6));
+}
+
+Scene sun() {
+  Workshop make;
+  add_yard(make, Dielectric{1.2, gray(1.0), gray(1.0)});
+  const Eigen::Matrix3d turn =
+      (Eigen::AngleAxisd(0.7, Vec3d::UnitY()) * Eigen::AngleAxisd(0.4, Vec3d::UnitX()))
+          .toRotationMatrix();
+  make->set_environment(EnvironmentMap(sun_bitmap(32, 16, 300.0F), turn, 0.8));
+  make->add_emitter({{1.0, 2.0, 1.5}, {2, 2, 2}});
+  return make->build();
+}
+
+Scene overcast() {
+  Workshop make;
+  add_yard(make, RoughDielectric{beckmann(0.1), 1.3, gray(1.0), gray(1.0)});
+  make->set_environment(ConstantEnvironment{{0.8, 0.9, 1.0}});
+  return make->build();
+}
+
+}  // namespace
+
+const std::vector<TestScene>& test_scenes() {
+  static const std::vector<TestScene> scenes = [] {
+    std::vector<TestScene> result;
+    result.push_back({"room", room(), 6});
+    result.push_back({"glass", glass(), 8});
+    result.push_back({"sun", sun(), 6});
+    result.push_back({"overcast", overcast(), 6});
+    return result;
+  }();
+  return scenes;
+}
+
+std::vector<PathSampler::Sample> light_paths(const TestScene& scene, int count,
+                                             std::uint64_t seed) {
+  const PathSampler sampler(scene.scene, scene.max_depth);
+  std::vector<PathSampler::Sample> result;
+  for (std::uint64_t i = 0; static_cast<int>(result.size()) < count; ++i) {
+    Rng rng(seed, Stream::Test, i);
+    const auto sample = sampler.sample(rng);
+    if (!sample) continue;
+    if (std::isfinite(contribution(scene.scene, sample->topology, sample->coordinates).log_target))
+      result.push_back(*sample);
+  }
+  return result;
+}
+
+}  // namespace driftlight::test
