@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "driftlight/gradient.h"
 
+#include <Eigen/Cholesky>
 #include <cmath>
 
 #include "driftlight/constraints.h"
@@ -220,9 +221,15 @@ Vector divergence(const Scene& scene, const PathTopology& topology, const Chart&
   Matrix minus;
   Vector delta = Vector::Zero(d);
   Vector sum = Vector::Zero(d);
+  // Q_jj = |L^-1 e_j|^2 with Q^-1 = L L^T
+  const Eigen::LLT<Matrix> cholesky(q_inverse);
+  const Matrix l_inverse = cholesky.matrixL().solve(Matrix::Identity(d, d));
   for (int j = 0; j < d; ++j) {
-    // A step of a thousandth of the constraint's own width: far above rounding, far below curvature.
-    const double h = 1e-3 * std::min(1.0, std::sqrt(q_inverse(j, j)) / 3.0);
+    // A small part of the width that the constraints leave to this coordinate while the others are
+    // held, 1 / (3 sqrt(Q_jj)): far above rounding, far below curvature. The width sqrt(Q^-1_jj) / 3
+    // of free others can be a hundred times that, and a step of it leaves the valley.
+    const double q_jj = l_inverse.col(j).squaredNorm();
+    const double h = 1e-4 * std::min(1.0, 1.0 / (3.0 * std::sqrt(q_jj)));
     delta[j] = h;
     constraint_matrix(scene, topology, chart, delta, plus);
     delta[j] = -h;

@@ -79,13 +79,14 @@ PathSampler::PathSampler(const Scene& scene, int max_depth)
       max_depth_(max_depth),
       table_(std::vector<double>(static_cast<std::size_t>(2 * max_depth - 1), 1.0)) {}
 
-void PathSampler::learn(const std::vector<double>& energy) {
+void PathSampler::learn(const std::vector<double>& squared_weights) {
   double total = 0;
-  for (const double e : energy) total += e;
+  for (const double w2 : squared_weights) total += std::sqrt(w2);
   if (!(total > 0.0)) return;
   std::vector<double> weights;
-  for (const double e : energy)
-    weights.push_back(0.9 * e / total + 0.1 / static_cast<double>(energy.size()));
+  for (const double w2 : squared_weights)
+    weights.push_back(0.9 * std::sqrt(w2) / total +
+                      0.1 / static_cast<double>(squared_weights.size()));
   table_ = DiscreteDistribution(weights);
 }
 

@@ -179,8 +179,7 @@ TEST(ObjFile, RefusesBadFiles) {
   expect_contains(mesh_error("obj", "v 0 0 0\nf 1/5 1/5 1/5\n"), "texture coordinate 5");
   expect_contains(mesh_error("obj", "v 0 0 0\nf 1 1\n"), "three corners");
   expect_contains(mesh_error("obj", "v 1e999 0 0\nf 1 1 1\n"), "finite");
-  expect_contains(mesh_error("obj", "v 0 0 0\nvn 0 0 1\nf 1//1 1//1 1//1\nf 1 1 1\n"),
-                  "normals");
+  expect_contains(mesh_error("obj", "v 0 0 0\nvn 0 0 1\nf 1//1 1//1 1//1\nf 1 1 1\n"), "normals");
 }
 
 // --- serialized ----------------------------------------------------------------------------------
@@ -199,10 +198,10 @@ void append_all(std::string& bytes, std::initializer_list<T> values) {
 std::string compress_bytes(const std::string& bytes) {
   uLongf size = compressBound(static_cast<uLong>(bytes.size()));
   std::string result(size, '\0');
-  EXPECT_EQ(compress(reinterpret_cast<Bytef*>(result.data()), &size,
-                     reinterpret_cast<const Bytef*>(bytes.data()),
-                     static_cast<uLong>(bytes.size())),
-            Z_OK);
+  EXPECT_EQ(
+      compress(reinterpret_cast<Bytef*>(result.data()), &size,
+               reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uLong>(bytes.size())),
+      Z_OK);
   result.resize(size);
   return result;
 }
@@ -292,7 +291,7 @@ TEST(SerializedFile, MirroringKeepsTheOutside) {
 TEST(SerializedFile, RefusesTruncatedFiles) {
   const std::string file = one_triangle(4, 1);
   for (const std::size_t size : {std::size_t{0}, std::size_t{3}, std::size_t{4}, std::size_t{20},
-                                 file.size() - 6})
+                                 file.size() - 6, file.size() - 1})
     expect_contains(mesh_error("serialized", file.substr(0, size)), "truncated");
 }
 
@@ -306,6 +305,9 @@ TEST(SerializedFile, RefusesCorruptFiles) {
   expect_contains(mesh_error("serialized", changed), "version 7");
   changed = file;
   changed[4] = '\x55';
+  expect_contains(mesh_error("serialized", changed), "corrupt");
+  changed = file;
+  changed.back() = static_cast<char>(changed.back() ^ 1);  // of the checksum
   expect_contains(mesh_error("serialized", changed), "corrupt");
 
   std::string beyond = mesh_preamble(4, 0x1000, 3, 1);

@@ -98,15 +98,14 @@ TEST(BsdfsXml, ReadsRoughDielectrics) {
 TEST(BsdfsXml, ReadsPhong) {
   const std::string colors = R"(<rgb name="diffuseReflectance" value="0.6, 0.1, 0"/>
                                 <rgb name="specularReflectance" value="0.6, 0.2, 0.3"/>)";
-  const auto scaled =
-      std::get<Phong>(load_bsdf("<bsdf type=\"phong\">" + colors + "</bsdf>"));
+  const auto scaled = std::get<Phong>(load_bsdf("<bsdf type=\"phong\">" + colors + "</bsdf>"));
   EXPECT_EQ(scaled.exponent, 30);
   const double factor = 0.99 / 1.2;
   expect_near(scaled.diffuse_reflectance.color, Rgbd(factor * Rgbd(0.6, 0.1, 0)));
   expect_near(scaled.specular_reflectance.color, Rgbd(factor * Rgbd(0.6, 0.2, 0.3)));
   const auto kept = std::get<Phong>(load_bsdf(
-      "<bsdf type=\"phong\"><boolean name=\"ensureEnergyConservation\" value=\"false\"/>" +
-      colors + "</bsdf>"));
+      "<bsdf type=\"phong\"><boolean name=\"ensureEnergyConservation\" value=\"false\"/>" + colors +
+      "</bsdf>"));
   expect_near(kept.specular_reflectance.color, Rgbd(0.6, 0.2, 0.3));
 }
 
@@ -115,8 +114,7 @@ TEST(BsdfsXml, ScalesReflectanceAboveOneAndSaysSo) {
   const LoadedScene loaded = directory.load(lit(
       R"(<shape type="sphere"><bsdf type="diffuse"><rgb name="reflectance" value="2, 1, 0"/></bsdf>
          </shape>)"));
-  expect_near(std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance.color,
-              Rgbd(0.99, 0.495, 0));
+  expect_near(std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance.color, Rgbd(0.99, 0.495, 0));
   EXPECT_EQ(loaded.notices.size(), 1U);
 }
 
@@ -149,7 +147,6 @@ TEST(BsdfsXml, ShapesShareReferredMaterials) {
   EXPECT_EQ(loaded.scene.shapes()[0].material, loaded.scene.shapes()[1].material);
 }
 
-
 TEST(ColorXml, ReadsEveryNotation) {
   const auto color = [](const std::string& element) {
     return std::get<Diffuse>(load_bsdf("<bsdf type=\"diffuse\">" + element + "</bsdf>"))
@@ -164,7 +161,6 @@ TEST(ColorXml, ReadsEveryNotation) {
   expect_near(color(R"(<spectrum name="reflectance" value="360:0.5, 830:0.5"/>)"),
               Rgbd(0.6024, 0.4742, 0.4544), 5e-4);
 }
-
 
 TEST(EmittersXml, ReadsAreaEmitters) {
   const SceneDirectory directory;
@@ -201,7 +197,6 @@ TEST(EmittersXml, ReadsConstants) {
               Rgbd(0.5, 0.5, 0.5));
 }
 
-
 /// Writes an image of three channels.
 template <class T>
 void write_image(const std::filesystem::path& file, int width, int height,
@@ -220,8 +215,8 @@ TEST(EmittersXml, ReadsEnvironmentMaps) {
   std::vector<float> texels(24, 0.0F);
   texels[6] = 1.0F;
   write_image(directory.path() / "sky.exr", 4, 2, texels, OIIO::TypeDesc::FLOAT);
-  const LoadedScene loaded = directory.load(with_sensor(
-      kShape + R"(<emitter type="envmap"><string name="filename" value="sky.exr"/>
+  const LoadedScene loaded = directory.load(
+      with_sensor(kShape + R"(<emitter type="envmap"><string name="filename" value="sky.exr"/>
          <float name="scale" value="3"/><transform name="toWorld"><rotate y="1" angle="90"/>
          <translate x="7"/></transform></emitter>)"));
   const auto& sky = std::get<EnvironmentMap>(loaded.scene.emitters()[0]);

@@ -126,8 +126,7 @@ TEST(ShapesXml, ShapesWithoutBsdfAreGrey) {
   const LoadedScene loaded = directory.load(with_sensor(
       R"(<shape type="sphere"/><shape type="rectangle"><emitter type="area"/></shape>)"));
   ASSERT_EQ(loaded.scene.bsdfs().size(), 2U);
-  expect_near(std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance.color,
-              Rgbd(0.5, 0.5, 0.5));
+  expect_near(std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance.color, Rgbd(0.5, 0.5, 0.5));
   expect_near(std::get<Diffuse>(loaded.scene.bsdfs()[1]).reflectance.color, Rgbd(0, 0, 0));
 }
 

@@ -45,27 +45,25 @@ TEST(SceneFile, ReadsThePartsOfAScene) {
 
 TEST(SceneFile, SubstitutesDefaults) {
   const SceneDirectory directory;
-  const LoadedScene loaded = directory.load(
-      lit(R"(<default name="r" value="2.5"/><default name="rough" value="ignored"/>
+  const LoadedScene loaded =
+      directory.load(lit(R"(<default name="r" value="2.5"/><default name="rough" value="ignored"/>
              <shape type="sphere"><float name="radius" value="$r"/></shape>)"));
   EXPECT_EQ(std::get<Sphere>(loaded.scene.shapes()[0].geometry).radius, 2.5);
 }
 
 TEST(SceneFile, UserDefinitionsWinOverDefaults) {
   const SceneDirectory directory;
-  const LoadedScene loaded = directory.load(
-      lit(R"(<default name="r" value="2.5"/>
+  const LoadedScene loaded = directory.load(lit(R"(<default name="r" value="2.5"/>
              <shape type="sphere"><float name="radius" value="1$r"/></shape>)"),
-      {{{"r", "7"}}});
+                                            {{{"r", "7"}}});
   EXPECT_EQ(std::get<Sphere>(loaded.scene.shapes()[0].geometry).radius, 17);
 }
 
 TEST(SceneFile, TheLongestNameIsSubstituted) {
   const SceneDirectory directory;
-  const LoadedScene loaded = directory.load(
-      lit(R"(<default name="rad" value="1"/>
+  const LoadedScene loaded = directory.load(lit(R"(<default name="rad" value="1"/>
              <shape type="sphere"><float name="radius" value="$radius2"/></shape>)"),
-      {{{"radius", "3"}}});
+                                            {{{"radius", "3"}}});
   EXPECT_EQ(std::get<Sphere>(loaded.scene.shapes()[0].geometry).radius, 32);
 }
 
@@ -82,8 +80,7 @@ TEST(SceneFile, IncludesOtherFilesInPlace) {
   const SceneDirectory directory;
   directory.write("materials.xml", scene_file(R"(<bsdf type="diffuse" id="m">
       <rgb name="reflectance" value="0.1"/></bsdf><default name="r" value="3"/>)"));
-  const LoadedScene loaded = directory.load(
-      lit(R"(<include filename="materials.xml"/>
+  const LoadedScene loaded = directory.load(lit(R"(<include filename="materials.xml"/>
              <shape type="sphere"><ref id="m"/><float name="radius" value="$r"/></shape>)"));
   EXPECT_EQ(std::get<Sphere>(loaded.scene.shapes()[0].geometry).radius, 3);
   expect_near(std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance.color,
@@ -116,7 +113,8 @@ TEST(SceneFile, SaysWhichIntegratorIsNotOurs) {
 TEST(SceneFile, KeepsTheDepthOfForeignBlocks) {
   const SceneDirectory directory;
   const LoadedScene loaded = directory.load(complete(
-      R"(<dpt><string name="integrator" value="mcmc"/><integer name="maxdepth" value="8"/></dpt>)"));
+      R"(<dpt><string name="integrator" value="mcmc"/>
+         <integer name="maxdepth" value="8"/></dpt>)"));
   EXPECT_EQ(loaded.max_depth, 8);
   ASSERT_EQ(loaded.notices.size(), 1U);
   EXPECT_NE(loaded.notices[0].find("<dpt>"), std::string::npos);
@@ -149,9 +147,9 @@ TEST(SensorXml, LooksAtItsTarget) {
 
 TEST(SensorXml, MeasuresTheFieldOfViewAlongItsAxis) {
   const auto camera = [](const std::string& axis, int width, int height) {
-    return load_camera(R"(<float name="fov" value="60"/><string name="fovAxis" value=")" + axis +
-                           R"("/>)",
-                       width, height);
+    return load_camera(
+        R"(<float name="fov" value="60"/><string name="fovAxis" value=")" + axis + R"("/>)", width,
+        height);
   };
   const double half = std::tan(kPi / 6.0);
   EXPECT_NEAR(camera("x", 200, 100).half_width, half, 1e-12);

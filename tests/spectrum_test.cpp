@@ -13,13 +13,13 @@ void expect_near(const Rgbd& actual, const Rgbd& expected, double tolerance) {
 }
 
 TEST(Cie1931, HasItsPublishedValues) {
-  const auto at = [](int nm) { return kCie1931[static_cast<std::size_t>(nm - kCieFirst)]; };
+  const auto at = [](int nm) { return &kCie1931[3 * static_cast<std::size_t>(nm - kCieFirst)]; };
   EXPECT_NEAR(at(555)[1], 1.0, 1e-6);
   EXPECT_NEAR(at(600)[0], 1.0622, 1e-6);
   EXPECT_NEAR(at(445)[2], 1.78260, 1e-4);
   // An equal-energy spectrum is neutral: the three functions have the same integral.
   Vec3d sum = Vec3d::Zero();
-  for (const auto& xyz : kCie1931) sum += Vec3d(xyz.data());
+  for (int nm = kCieFirst; nm < kCieFirst + kCieSamples; ++nm) sum += Vec3d(at(nm));
   EXPECT_NEAR(sum.x() / sum.y(), 1.0, 5e-4);
   EXPECT_NEAR(sum.z() / sum.y(), 1.0, 5e-4);
 }

@@ -10,7 +10,7 @@
 
 namespace driftlight {
 
-/// Learns the sampler's table from a pilot of count / 4 samples, then draws `count` samples with
+/// Learns the sampler's table from a pilot of `count` samples, then draws `count` samples with
 /// weights w = f / q: b = E[w]. Sample i comes from its own stream, so that any of them can be drawn
 /// again, bit for bit. Runs in the current TBB arena; the result does not depend on its size.
 class Bootstrap {

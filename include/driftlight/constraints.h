@@ -111,11 +111,15 @@ class ConstraintVisitor : public WalkVisitor<T> {
   static S environment_precision(const EnvironmentMap& map, const Vec3<S>& v) {
     using J = ceres::Jet<S, 2>;
     const TangentBasis basis = tangent_basis(value(v));
+    // Minus their parts along v, which are 0 but whose derivatives are not where S is a jet: the
+    // slope stays tangential as v turns.
+    const S t_along = dot(basis.t, v);
+    const S b_along = dot(basis.b, v);
     Vec3<J> seeded;
     for (int i = 0; i < 3; ++i) {
       seeded[i] = J(v[i]);
-      seeded[i].v[0] = constant<S>(basis.t[i]);
-      seeded[i].v[1] = constant<S>(basis.b[i]);
+      seeded[i].v[0] = basis.t[i] - t_along * v[i];
+      seeded[i].v[1] = basis.b[i] - b_along * v[i];
     }
     const J radiance = luminance(map.eval(seeded));
     const double texel = map.texel_angle();

@@ -37,8 +37,8 @@ T fresnel_conductor(const T& cos_i, double eta, double k) {
   const T sum = sqrt(difference * difference + 4.0 * eta * eta * k * k);
   // Two forms of one value. The second has no cancellation where sum + difference is small, and at
   // eta = 0 (a perfect mirror) or total reflection (k = 0) it is 0 with derivative 0.
-  const T a = value(difference) > 0.0 ? T(sqrt(0.5 * (sum + difference)))
-                                      : T(std::sqrt(2.0) * eta * k / sqrt(sum - difference));
+  const T a = value(difference) >= 0.0 ? T(sqrt(0.5 * (sum + difference)))
+                                       : T(std::sqrt(2.0) * eta * k / sqrt(sum - difference));
   const T s1 = sum + cos2;
   const T s2 = 2.0 * a * cos_i;
   const T perpendicular = (s1 - s2) / (s1 + s2);

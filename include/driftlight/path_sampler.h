@@ -37,9 +37,12 @@ class PathSampler {
   };
 
   int entry_count() const { return table_.size(); }
-  /// Replaces the table: probabilities in proportion to `energy` (of f / q, by entry), mixed with a
-  /// tenth of the uniform one so that nothing becomes impossible.
-  void learn(const std::vector<double>& energy);
+  /// Replaces the table, given sums by entry of (f / q)^2 over samples from the uniform one:
+  /// probabilities in proportion to their square roots, which minimises the variance of E[f / q]
+  /// (Neyman's allocation: a strategy that scores rarely but heavily is tried more often than its
+  /// energy alone would ask for), mixed with a tenth of the uniform one so that nothing becomes
+  /// impossible.
+  void learn(const std::vector<double>& squared_weights);
 
   /// None if the attempt carries no light for certain.
   std::optional<Sample> sample(Rng& rng) const;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <span>
 
 #include "properties.h"
 #include "refractive_indices.h"
@@ -26,8 +25,8 @@ void conserve_energy(Properties& properties, LoadContext& context,
   const double factor = 0.99 / sum.maxCoeff();
   for (Texture* texture : textures) scale(*texture, factor);
   context.notice(properties.element(), "the reflectance of " + properties.description() +
-                                           " exceeds 1 and is scaled by " +
-                                           std::to_string(factor) + ", as in Mitsuba");
+                                           " exceeds 1 and is scaled by " + std::to_string(factor) +
+                                           ", as in Mitsuba");
 }
 
 /// Reads a texture that acts alone.
@@ -62,9 +61,8 @@ Microfacets read_microfacets(Properties& properties, LoadContext& context) {
 
 Bsdf read_diffuse(Properties& properties, LoadContext& context) {
   const bool long_name = properties.has("diffuseReflectance") && !properties.has("reflectance");
-  return Diffuse{read_scattering(properties, context,
-                                 long_name ? "diffuseReflectance" : "reflectance",
-                                 Rgbd::Constant(0.5))};
+  return Diffuse{read_scattering(
+      properties, context, long_name ? "diffuseReflectance" : "reflectance", Rgbd::Constant(0.5))};
 }
 
 /// eta and k of a metal: by name, where given by value, over the index outside.
@@ -88,8 +86,7 @@ void read_metal(Properties& properties, LoadContext& context, Rgbd& eta, Rgbd& k
 Bsdf read_conductor(Properties& properties, LoadContext& context) {
   Conductor bsdf;
   read_metal(properties, context, bsdf.eta, bsdf.k);
-  bsdf.specular_reflectance =
-      read_scattering(properties, context, "specularReflectance", kWhite);
+  bsdf.specular_reflectance = read_scattering(properties, context, "specularReflectance", kWhite);
   return bsdf;
 }
 
@@ -97,8 +94,7 @@ Bsdf read_rough_conductor(Properties& properties, LoadContext& context) {
   RoughConductor bsdf;
   bsdf.microfacets = read_microfacets(properties, context);
   read_metal(properties, context, bsdf.eta, bsdf.k);
-  bsdf.specular_reflectance =
-      read_scattering(properties, context, "specularReflectance", kWhite);
+  bsdf.specular_reflectance = read_scattering(properties, context, "specularReflectance", kWhite);
   return bsdf;
 }
 
@@ -107,8 +103,7 @@ template <class D>
 D read_interface(Properties& properties, LoadContext& context) {
   D bsdf;
   bsdf.eta = read_index(properties, "intIOR", "bk7") / read_index(properties, "extIOR", "air");
-  bsdf.specular_reflectance =
-      read_scattering(properties, context, "specularReflectance", kWhite);
+  bsdf.specular_reflectance = read_scattering(properties, context, "specularReflectance", kWhite);
   bsdf.specular_transmittance =
       read_scattering(properties, context, "specularTransmittance", kWhite);
   return bsdf;

@@ -57,8 +57,7 @@ Rgbd read_color(const Element& element) {
     return text.find(':') == std::string::npos ? read_triple(element, parts)
                                                : read_wavelengths(element, parts);
   const bool hexadecimal = parts.size() == 1 && parts[0].front() == '#';
-  const Rgbd rgb =
-      hexadecimal ? read_hexadecimal(element, parts[0]) : read_triple(element, parts);
+  const Rgbd rgb = hexadecimal ? read_hexadecimal(element, parts[0]) : read_triple(element, parts);
   return element.tag() == "srgb" ? rgb.unaryExpr(&srgb_to_linear).eval() : rgb;
 }
 

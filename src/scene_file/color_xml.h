@@ -7,8 +7,8 @@
 
 namespace driftlight {
 
-/// Linear sRGB of <rgb>, <srgb> (one value, three values or #rrggbb) or <spectrum> (one value, three
-/// values, or a list "wavelength:value, ..", nm). Throws SceneError on negative values.
+/// Linear sRGB of <rgb> or <srgb> (one value, three values or #rrggbb) or of <spectrum> (one value,
+/// three values, or a list "wavelength:value, ..", nm). Throws SceneError on negative values.
 Rgbd read_color(const Element& element);
 
 }  // namespace driftlight

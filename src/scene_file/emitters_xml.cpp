@@ -46,7 +46,7 @@ void read_environment_map(Properties& properties, LoadContext& context) {
   const Eigen::Matrix3d to_world = read_rotation(properties);
   properties.ignore({"cache"});
   with_location(properties.element(), [&] {
-    Bitmap bitmap = read_image(context.directory / file, gamma);
+    Bitmap bitmap = read_bitmap(context.directory / file, gamma);
     const bool black = std::all_of(bitmap.texels.begin(), bitmap.texels.end(),
                                    [](const auto& texel) { return (texel == 0.0F).all(); });
     if (black || scale == 0.0) throw InputError("the environment map is black");

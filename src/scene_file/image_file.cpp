@@ -3,6 +3,7 @@
 
 #include <OpenImageIO/imageio.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -31,7 +32,7 @@ float decode(float encoded, const Gamma& gamma) {
 
 }  // namespace
 
-Bitmap read_image(const std::filesystem::path& file, const std::optional<Gamma>& gamma_override) {
+Bitmap read_bitmap(const std::filesystem::path& file, const std::optional<Gamma>& gamma_override) {
   // Mitsuba does not multiply colours by alpha.
   OIIO::ImageSpec config;
   config["oiio:UnassociatedAlpha"] = 1;

@@ -15,6 +15,6 @@ using Gamma = std::optional<double>;
 /// Reads an image into linear sRGB; alpha is dropped, grey is spread over three channels, negative
 /// values become 0. Without an override, floating-point files are linear, and the others are sRGB
 /// unless they name a gamma. Throws InputError.
-Bitmap read_image(const std::filesystem::path& file, const std::optional<Gamma>& gamma_override);
+Bitmap read_bitmap(const std::filesystem::path& file, const std::optional<Gamma>& gamma_override);
 
 }  // namespace driftlight

@@ -24,8 +24,7 @@ const NamedObjects::Object& NamedObjects::find(const Element& ref) const {
   }
   std::vector<std::string> known;
   for (const auto& [name, object] : objects_) known.push_back(name);
-  ref.fail("nothing has the id '" + id + "'; valid are: " +
-           (known.empty() ? "none" : join(known)));
+  ref.fail("nothing has the id '" + id + "'; valid are: " + (known.empty() ? "none" : join(known)));
 }
 
 }  // namespace driftlight

@@ -26,8 +26,7 @@ constexpr std::array kUnsupported{"subsurface", "medium", "volume",  "phase",   
 class SceneLoader {
  public:
   SceneLoader(const std::filesystem::path& file, const LoadOptions& options)
-      : file_(file),
-        context_{file.parent_path(), Substitutions(options.defines), {}, {}, {}} {}
+      : file_(file), context_{file.parent_path(), Substitutions(options.defines), {}, {}, {}} {}
 
   LoadedScene load() {
     const Element root = read_file(file_);
@@ -58,6 +57,7 @@ class SceneLoader {
   }
 
   void read(const Element& element) {
+    element.check_names();
     const std::string tag = element.tag();
     if (tag == "default") {
       read_default(element);
@@ -102,9 +102,9 @@ class SceneLoader {
     const std::filesystem::path file = context_.directory / element.text("filename");
     if (!std::filesystem::exists(file))
       element.fail("the file '" + file.string() + "' does not exist");
-    const bool cyclic =
-        std::any_of(open_files_.begin(), open_files_.end(),
-                    [&](const auto& other) { return std::filesystem::equivalent(file, other); });
+    const bool cyclic = std::any_of(open_files_.begin(), open_files_.end(), [&](const auto& other) {
+      return std::filesystem::equivalent(file, other);
+    });
     if (cyclic) element.fail("cyclic include: '" + file.string() + "' includes itself");
     read_file(file);
   }
@@ -118,20 +118,24 @@ class SceneLoader {
   void read_integrator(const Element& element) {
     Properties properties(element);
     if (properties.type() != "langevin" && properties.type() != "path")
-      context_.notice(element, properties.description() +
-                                   " is not driftlight's; only its maxDepth is used");
+      context_.notice(element,
+                      properties.description() + " is not driftlight's; only its maxDepth is used");
     if (properties.boolean("hideEmitters", false))
       properties.fail("hideEmitters", "hiding emitters is not supported");
     if (const auto depth = properties.find("maxDepth")) set_max_depth(*depth);
     context_.objects.define(element, NamedObjects::Other{});
   }
 
-  /// A block of some other program, which may hold the depth of its integrator.
+  /// A block of some other program, which may hold the depth of its integrator. Such blocks have no
+  /// type, unlike all that matters to the picture, whose names may be misspelt.
   void read_other(const Element& element) {
     const std::string tag = element.tag();
-    if (std::find(kUnsupported.begin(), kUnsupported.end(), tag) != kUnsupported.end())
-      element.fail("<" + tag + "> is not supported in a scene; valid are: default, include, "
-                   "integrator, sensor, bsdf, texture, emitter, shape");
+    const bool of_mitsuba =
+        std::find(kUnsupported.begin(), kUnsupported.end(), tag) != kUnsupported.end();
+    if (of_mitsuba || element.find("type"))
+      element.fail("<" + tag +
+                   "> is not supported in a scene; valid are: default, include, integrator, "
+                   "sensor, bsdf, texture, emitter, shape");
     context_.notice(element, "block <" + tag + "> is not ours; only its maxDepth is used");
     for (const Element& child : element.children())
       if (lower_case(child.find("name").value_or("")) == "maxdepth") set_max_depth(child);

@@ -31,8 +31,7 @@ double corner_angle(const TriangleMesh& mesh, const std::array<std::uint32_t, 3>
 
 template <class Vector>
 bool all_finite(const std::vector<Vector>& vectors) {
-  return std::all_of(vectors.begin(), vectors.end(),
-                     [](const Vector& v) { return v.allFinite(); });
+  return std::all_of(vectors.begin(), vectors.end(), [](const Vector& v) { return v.allFinite(); });
 }
 
 void compute_smooth_normals(TriangleMesh& mesh) {
@@ -46,7 +45,7 @@ void compute_smooth_normals(TriangleMesh& mesh) {
   for (const Vec3d& sum : sums) {
     // Vertices of no triangle with an area need some direction, too.
     const Vec3d normal = sum.norm() > 0.0 ? Vec3d(sum.normalized()) : Vec3d(1, 0, 0);
-    mesh.normals.push_back(normal.cast<float>());
+    mesh.normals.emplace_back(normal.cast<float>());
   }
 }
 
@@ -87,8 +86,7 @@ void check_mesh(const TriangleMesh& mesh) {
 }
 
 void transform_mesh(TriangleMesh& mesh, const Eigen::Affine3d& to_world) {
-  for (Eigen::Vector3f& p : mesh.positions)
-    p = (to_world * p.cast<double>()).cast<float>();
+  for (Eigen::Vector3f& p : mesh.positions) p = (to_world * p.cast<double>()).cast<float>();
   const Eigen::Matrix3d normal_to_world = to_world.linear().inverse().transpose();
   for (Eigen::Vector3f& n : mesh.normals)
     n = (normal_to_world * n.cast<double>()).normalized().cast<float>();

@@ -8,7 +8,8 @@
 
 namespace driftlight {
 
-/// Throws InputError if the mesh is empty, has an index out of range or a number that is not finite.
+/// Throws InputError if the mesh is empty, or has an index out of range or a number that is not
+/// finite.
 void check_mesh(const TriangleMesh& mesh);
 
 /// Brings positions and normals from object to world space.

@@ -27,6 +27,7 @@ class ObjReader {
   void add_polygon(const tinyobj::index_t* corners, int count) {
     if (count < 3) throw InputError("a face has fewer than three corners");
     std::vector<std::uint32_t> vertices;
+    vertices.reserve(static_cast<std::size_t>(count));
     for (int i = 0; i < count; ++i) vertices.push_back(vertex(corners[i]));
     for (std::size_t i = 2; i < vertices.size(); ++i)
       mesh_.triangles.push_back({vertices[0], vertices[i - 1], vertices[i]});

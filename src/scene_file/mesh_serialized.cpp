@@ -3,6 +3,7 @@
 
 #include <zlib.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <fstream>
@@ -24,12 +25,11 @@ static_assert(std::endian::native == std::endian::little, "the reader copies byt
 
 constexpr std::uint16_t kMagic = 0x041C;
 
-enum Flags : std::uint32_t {
-  kHasNormals = 0x0001,
-  kHasTexCoords = 0x0002,
-  kHasColors = 0x0008,
-  kDoublePrecision = 0x2000,
-};
+// Flags.
+constexpr std::uint32_t kHasNormals = 0x0001;
+constexpr std::uint32_t kHasTexCoords = 0x0002;
+constexpr std::uint32_t kHasColors = 0x0008;
+constexpr std::uint32_t kDoublePrecision = 0x2000;
 
 /// The bytes of a file, read at any place.
 class BinaryFile {
@@ -41,7 +41,7 @@ class BinaryFile {
 
   std::uint64_t size() const { return size_; }
 
-  std::string bytes(std::uint64_t offset, std::uint64_t count) {
+  std::string read(std::uint64_t offset, std::uint64_t count) {
     if (offset > size_ || count > size_ - offset) throw InputError("it is truncated");
     std::string result(count, '\0');
     stream_.seekg(static_cast<std::streamoff>(offset));
@@ -53,7 +53,7 @@ class BinaryFile {
   template <class T>
   T number(std::uint64_t offset) {
     T result;
-    std::memcpy(&result, bytes(offset, sizeof(T)).data(), sizeof(T));
+    std::memcpy(&result, read(offset, sizeof(T)).data(), sizeof(T));
     return result;
   }
 
@@ -62,12 +62,10 @@ class BinaryFile {
   std::uint64_t size_ = 0;
 };
 
-/// Decompresses a zlib stream piece by piece.
+/// Decompresses the zlib stream that begins at some place of a file, piece by piece.
 class InflateStream {
  public:
-  explicit InflateStream(std::string compressed) : compressed_(std::move(compressed)) {
-    stream_.next_in = reinterpret_cast<Bytef*>(compressed_.data());
-    stream_.avail_in = static_cast<uInt>(compressed_.size());
+  InflateStream(BinaryFile& file, std::uint64_t offset) : file_(file), offset_(offset) {
     if (inflateInit(&stream_) != Z_OK) throw RuntimeError("zlib cannot be initialised");
   }
   ~InflateStream() { inflateEnd(&stream_); }
@@ -77,7 +75,7 @@ class InflateStream {
   /// Throws InputError unless `count` elements of `size` bytes can be in the stream. It bounds what
   /// a corrupt header can make us allocate: deflate never expands more than 1032 times.
   void expect(std::uint64_t count, std::uint64_t size) const {
-    if (count > 1032 * static_cast<std::uint64_t>(compressed_.size()) / size)
+    if (count > 1032 * file_.size() / size)
       throw InputError("it is corrupt: it says that it has " + std::to_string(count) +
                        " elements, which is more than its size allows");
   }
@@ -87,11 +85,9 @@ class InflateStream {
     while (size > 0) {
       const auto piece = static_cast<uInt>(std::min<std::size_t>(size, 1U << 30U));
       stream_.avail_out = piece;
-      const int status = inflate(&stream_, Z_NO_FLUSH);
+      inflate_some();
       size -= piece - stream_.avail_out;
-      if (size > 0 && status != Z_OK)
-        throw InputError(status == Z_DATA_ERROR ? "its compressed data is corrupt"
-                                                : "it is truncated");
+      if (ended_ && size > 0) throw InputError("it is truncated");
     }
   }
 
@@ -102,9 +98,37 @@ class InflateStream {
     return result;
   }
 
+  /// Reads the checksum after the last byte, by asking for one byte more.
+  void check_sum() {
+    Bytef extra = 0;
+    stream_.next_out = &extra;
+    stream_.avail_out = 1;
+    while (!ended_ && stream_.avail_out > 0) inflate_some();
+  }
+
  private:
-  std::string compressed_;
+  void inflate_some() {
+    if (stream_.avail_in == 0 && !ended_) refill();
+    const int status = inflate(&stream_, Z_NO_FLUSH);
+    ended_ = status == Z_STREAM_END;
+    if (status != Z_OK && !ended_) throw InputError("its compressed data is corrupt");
+  }
+
+  void refill() {
+    constexpr std::uint64_t kPiece = 1U << 16U;
+    const std::uint64_t size = std::min(kPiece, file_.size() - offset_);
+    if (size == 0) throw InputError("it is truncated");
+    piece_ = file_.read(offset_, size);
+    offset_ += size;
+    stream_.next_in = reinterpret_cast<Bytef*>(piece_.data());
+    stream_.avail_in = static_cast<uInt>(size);
+  }
+
+  BinaryFile& file_;
+  std::uint64_t offset_;  ///< of what has not been read
+  std::string piece_;     ///< what is being decompressed
   z_stream stream_{};
+  bool ended_ = false;
 };
 
 template <class File, int N>
@@ -141,6 +165,7 @@ TriangleMesh read_mesh(InflateStream& stream, std::uint16_t version) {
   stream.expect(triangles, sizeof(mesh.triangles[0]));
   mesh.triangles.resize(triangles);
   stream.read(mesh.triangles.data(), triangles * sizeof(mesh.triangles[0]));
+  stream.check_sum();
   check_mesh(mesh);
   return mesh;
 }
@@ -170,17 +195,17 @@ std::uint16_t read_version(BinaryFile& file, std::uint64_t offset) {
 
 }  // namespace
 
-TriangleMesh read_serialized(const std::filesystem::path& path, int shape_index) {
+TriangleMesh read_serialized(const std::filesystem::path& file, int shape_index) {
   try {
     if (shape_index < 0) throw InputError("a shapeIndex must not be negative");
-    BinaryFile file(path);
+    BinaryFile bytes(file);
     const auto index = static_cast<std::uint64_t>(shape_index);
-    const std::uint64_t offset = find_mesh(file, read_version(file, 0), index);
-    const std::uint16_t version = read_version(file, offset);
-    InflateStream stream(file.bytes(offset + 4, file.size() - offset - 4));
+    const std::uint64_t offset = find_mesh(bytes, read_version(bytes, 0), index);
+    const std::uint16_t version = read_version(bytes, offset);
+    InflateStream stream(bytes, offset + 4);
     return read_mesh(stream, version);
   } catch (const InputError& error) {
-    throw InputError("the mesh file '" + path.string() + "' is not usable: " + error.what());
+    throw InputError("the mesh file '" + file.string() + "' is not usable: " + error.what());
   }
 }
 

@@ -20,8 +20,9 @@ void read_filter(Properties& film) {
   const std::vector<Element> filters = film.nested({"rfilter"});
   if (filters.size() != 1 || lower_case(filters[0].find("type").value_or("")) != "box")
     (filters.empty() ? film.element() : filters.back())
-        .fail("only the box filter is supported (Mitsuba's default is another one): write "
-              "<rfilter type=\"box\"/> in the film");
+        .fail(
+            "only the box filter is supported (Mitsuba's default is another one): write "
+            "<rfilter type=\"box\"/> in the film");
   Properties filter(filters[0]);
   if (filter.number("radius", 0.5) != 0.5) filter.fail("radius", "must be 0.5");
   filter.finish();
@@ -91,11 +92,9 @@ double from_focal_length(Properties& sensor, double aspect) {
 
 /// Half the width of the image plane at distance 1, tan(fov_x / 2).
 double read_half_width(Properties& sensor, double aspect) {
-  std::string axis =
-      sensor.choice("fovAxis", "x", {"x", "y", "diagonal", "smaller", "larger"});
+  std::string axis = sensor.choice("fovAxis", "x", {"x", "y", "diagonal", "smaller", "larger"});
   if (!sensor.has("fov")) return from_focal_length(sensor, aspect);
-  if (sensor.has("focalLength"))
-    sensor.fail("focalLength", "give either 'fov' or 'focalLength'");
+  if (sensor.has("focalLength")) sensor.fail("focalLength", "give either 'fov' or 'focalLength'");
   const double fov = sensor.number("fov", 0.0);
   if (!(fov > 0.0 && fov < 180.0)) sensor.fail("fov", "must be between 0 and 180 degrees");
 

@@ -4,7 +4,6 @@
 #include <Eigen/LU>
 #include <array>
 #include <cmath>
-#include <span>
 
 #include "bsdfs_xml.h"
 #include "emitters_xml.h"
@@ -28,11 +27,10 @@ struct Quad {
 };
 
 /// Appends the quad as two triangles whose winding follows the normal through mirrorings.
-void append_quad(TriangleMesh& mesh, const Quad& quad, const Eigen::Affine3d& to_world,
-                 bool flip) {
+void append_quad(TriangleMesh& mesh, const Quad& quad, const Eigen::Affine3d& to_world, bool flip) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   for (std::size_t i = 0; i < 4; ++i) {
-    mesh.positions.push_back((to_world * quad.corners[i]).cast<float>());
+    mesh.positions.emplace_back((to_world * quad.corners[i]).cast<float>());
     mesh.uvs.push_back(quad.uvs[i]);
   }
   const bool reverse = (to_world.linear().determinant() < 0.0) != flip;
@@ -122,10 +120,12 @@ std::vector<Geometry> read_obj_shape(Properties& properties, LoadContext& contex
   ObjFile file = with_location(properties.element(),
                                [&] { return read_obj(context.directory / name, options); });
   if (file.names_materials && load_materials && !attachments.surface)
-    properties.element().fail("'" + name + "' names materials of an .mtl file, which is not read; "
+    properties.element().fail("'" + name +
+                              "' names materials of an .mtl file, which is not read; "
                               "give the shape a bsdf, or set 'loadMaterials' to false");
   if (attachments.radiance && file.meshes.size() > 1)
-    properties.element().fail("'" + name + "' has several groups and cannot be an emitter; set "
+    properties.element().fail("'" + name +
+                              "' has several groups and cannot be an emitter; set "
                               "'collapse' to true");
   std::vector<Geometry> result;
   for (TriangleMesh& mesh : file.meshes) {
@@ -141,9 +141,8 @@ std::vector<Geometry> read_serialized_shape(Properties& properties, LoadContext&
   const std::string name = properties.required_text("filename");
   const int index = properties.integer("shapeIndex", 0);
   const Eigen::Affine3d to_world = properties.transform("toWorld");
-  TriangleMesh mesh = with_location(properties.element(), [&] {
-    return read_serialized(context.directory / name, index);
-  });
+  TriangleMesh mesh = with_location(
+      properties.element(), [&] { return read_serialized(context.directory / name, index); });
   transform_mesh(mesh, to_world);
   // Unlike for obj files, Mitsuba keeps the outside outside when this format is mirrored.
   if (to_world.linear().determinant() < 0.0) reverse_winding(mesh);

@@ -14,7 +14,9 @@ Vec3d matching_functions(double wavelength) {
   const double position = wavelength - kCieFirst;
   const int i = std::clamp(static_cast<int>(position), 0, kCieSamples - 2);
   const double t = position - i;
-  const auto at = [](int k) { return Vec3d(kCie1931[static_cast<std::size_t>(k)].data()); };
+  const auto at = [](int k) {
+    return Eigen::Map<const Vec3d>(&kCie1931[3 * static_cast<std::size_t>(k)]);
+  };
   return (1.0 - t) * at(i) + t * at(i + 1);
 }
 
@@ -62,8 +64,7 @@ Spectrum ramp_to_zero(Spectrum spectrum) {
   const double spacing = range / static_cast<double>(spectrum.size() - 1);
   if (spectrum.front().value != 0.0)
     spectrum.insert(spectrum.begin(), {spectrum.front().wavelength - spacing, 0.0});
-  if (spectrum.back().value != 0.0)
-    spectrum.push_back({spectrum.back().wavelength + spacing, 0.0});
+  if (spectrum.back().value != 0.0) spectrum.push_back({spectrum.back().wavelength + spacing, 0.0});
   return spectrum;
 }
 

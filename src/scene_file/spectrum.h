@@ -20,10 +20,10 @@ using Spectrum = std::vector<SpectrumSample>;
 /// samples, which is how Mitsuba continues lists in scene files.
 Spectrum ramp_to_zero(Spectrum spectrum);
 
-/// Linear sRGB of a spectrum, as a Mitsuba of three channels sees it: XYZ = integral of the spectrum
-/// times the CIE 1931 matching functions over the integral of y, exact for the piecewise linear
-/// tables. Equal energy 1 gives (1.2049, 0.9483, 0.9093), not white. Colours outside of the
-/// gamut are clamped to it, at zero.
+/// Linear sRGB of a spectrum, as a Mitsuba of three channels sees it: XYZ is the integral of the
+/// spectrum times the CIE 1931 matching functions, over the integral of y; exact for the piecewise
+/// linear tables. Equal energy 1 gives (1.2049, 0.9483, 0.9093), not white. Negative components,
+/// of colours outside of the gamut, become 0.
 Rgbd spectrum_to_rgb(const Spectrum& spectrum);
 
 /// The inverse of the sRGB transfer curve, for values from 0 to 1.

@@ -18,6 +18,7 @@ std::string_view leading_identifier(std::string_view text) {
 
 std::vector<std::string> keys(const std::map<std::string, std::string>& values) {
   std::vector<std::string> names;
+  names.reserve(values.size());
   for (const auto& [name, value] : values) names.push_back(name);
   return names;
 }
@@ -52,7 +53,8 @@ std::string Substitutions::apply(const std::string& text) {
     if (!name)
       throw InputError("'$" + std::string(leading_identifier(rest)) +
                        "' has no value; give it one with <default> or on the command line "
-                       "(defined are: " + (values_.empty() ? "none" : join(keys(values_))) + ")");
+                       "(defined are: " +
+                       (values_.empty() ? "none" : join(keys(values_))) + ")");
     result.append(text, done, dollar - done).append(values_.at(*name));
     unused_defines_.erase(*name);
     done = dollar + 1 + name->size();

@@ -19,12 +19,12 @@ void check_wrapping(Properties& properties) {
     properties.choice(name, "repeat", {"repeat"});
 }
 
-Texture read_bitmap(Properties& properties, LoadContext& context) {
+Texture read_bitmap_texture(Properties& properties, LoadContext& context) {
   Texture texture;
   const std::string file = properties.required_text("filename");
   const std::optional<Gamma> gamma = read_gamma(properties);
   texture.bitmap = with_location(properties.element(), [&] {
-    return std::make_shared<const Bitmap>(read_image(context.directory / file, gamma));
+    return std::make_shared<const Bitmap>(read_bitmap(context.directory / file, gamma));
   });
   const double both = properties.number("uvscale", 1.0);
   texture.uv_scale = {properties.number("uscale", both), properties.number("vscale", both)};
@@ -36,7 +36,8 @@ Texture read_bitmap(Properties& properties, LoadContext& context) {
 }
 
 using Reader = Texture (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, Reader>, 1> kTextures{{{"bitmap", &read_bitmap}}};
+constexpr std::array<std::pair<std::string_view, Reader>, 1> kTextures{
+    {{"bitmap", &read_bitmap_texture}}};
 
 }  // namespace
 

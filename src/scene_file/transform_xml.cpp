@@ -37,8 +37,7 @@ Eigen::Affine3d read_scale(const Element& element) {
   const bool by_axis = element.find("x") || element.find("y") || element.find("z");
   if (by_axis == element.find("value").has_value())
     element.fail("<scale> needs either 'value' or some of 'x', 'y', 'z'");
-  const Vec3d factors =
-      by_axis ? read_xyz(element, 1.0) : Vec3d::Constant(element.number("value"));
+  const Vec3d factors = by_axis ? read_xyz(element, 1.0) : Vec3d::Constant(element.number("value"));
   return Eigen::Affine3d(Eigen::Scaling(factors));
 }
 

@@ -8,8 +8,8 @@
 
 namespace driftlight {
 
-/// <transform>: its translate, rotate, scale, lookat and matrix steps, applied in the order in which
-/// they are written. Throws SceneError if the result is not an invertible affine map.
+/// <transform>: its translate, rotate, scale, lookat and matrix steps, applied in the order in
+/// which they are written. Throws SceneError if the result is not an invertible affine map.
 Eigen::Affine3d read_transform(const Element& element);
 
 }  // namespace driftlight

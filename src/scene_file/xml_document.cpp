@@ -34,8 +34,8 @@ struct DepthProbe : pugi::xml_tree_walker {
 
 XmlDocument::XmlDocument(const std::filesystem::path& file)
     : name_(file.string()), text_(read_text(file)) {
-  const pugi::xml_parse_result result = document_.load_buffer(
-      text_.data(), text_.size(), pugi::parse_default, pugi::encoding_utf8);
+  const pugi::xml_parse_result result =
+      document_.load_buffer(text_.data(), text_.size(), pugi::parse_default, pugi::encoding_utf8);
   if (!result)
     throw SceneError(location(static_cast<std::size_t>(std::max<std::ptrdiff_t>(result.offset, 0))),
                      "not well-formed XML: " + std::string(result.description()));
@@ -49,8 +49,8 @@ void XmlDocument::check_depth() const {
   DepthProbe probe;
   root().parent().traverse(probe);
   if (probe.too_deep)
-    throw SceneError(location(probe.too_deep), "nested more than " +
-                                                   std::to_string(kMaximumDepth) + " levels deep");
+    throw SceneError(location(probe.too_deep),
+                     "nested more than " + std::to_string(kMaximumDepth) + " levels deep");
 }
 
 SourceLocation XmlDocument::location(pugi::xml_node node) const {
@@ -127,6 +127,11 @@ void Element::allow_attributes(std::initializer_list<std::string_view> names) co
       fail("unknown attribute '" + std::string(name) + "' of <" + tag() +
            ">; valid are: " + join({names.begin(), names.end()}));
   }
+}
+
+void Element::check_names() const {
+  for (const pugi::xml_attribute attribute : node_.attributes()) find(attribute.name());
+  for (const Element& child : children()) child.check_names();
 }
 
 void Element::fail(const std::string& message) const { throw SceneError(location(), message); }

@@ -59,6 +59,10 @@ class Element {
   /// Throws SceneError on an attribute with another name.
   void allow_attributes(std::initializer_list<std::string_view> names) const;
 
+  /// Throws SceneError if a $name in the element or in anything inside of it has no value. Also
+  /// marks the names as used, which matters for elements that nobody reads.
+  void check_names() const;
+
   SourceLocation location() const { return document_->location(node_); }
   [[noreturn]] void fail(const std::string& message) const;
 

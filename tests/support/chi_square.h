@@ -28,7 +28,7 @@ ChiSquareResult chi_square_uniform(std::span<const double> samples, int cells = 
 /// Integral of f over the rectangle [x0, x1] x [y0, y1], by Gauss-Legendre rules on squares that are
 /// halved until the result changes by less than `tolerance`; at most `depth` halvings.
 double integrate(const std::function<double(double, double)>& f, double x0, double x1, double y0,
-                 double y1, double tolerance, int depth = 6);
+                 double y1, double tolerance, int depth = 8);
 
 /// Cells of the unit sphere in polar coordinates (theta, phi) about an axis. Rings are narrow near
 /// the axis, theta = pi (i / rings)^power, so that a sharp lobe there is resolved.
@@ -40,7 +40,7 @@ class SphereGrid {
   int cell(const Vec3d& direction) const;
   /// Integrals over all cells of a density per solid angle.
   std::vector<double> integrate(const std::function<double(const Vec3d&)>& density,
-                                double tolerance = 1e-7) const;
+                                double tolerance = 1e-6) const;
 
  private:
   double theta(int ring) const;

@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Laws of the BSDFs: samples follow their pdf, no energy is gained, and light may be turned round.
+#include "driftlight/bsdf.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "driftlight/random.h"
+#include "driftlight/warp.h"
+#include "support/chi_square.h"
+#include "support/t_test.h"
+#include "support/test_scenes.h"
+
+namespace driftlight::test {
+namespace {
+
+struct Named {
+  std::string name;
+  Bsdf bsdf;
+};
+
+const Texture kWhite(Rgbd::Ones());
+
+Texture bitmap_texture(double low, double high) {
+  Texture texture;
+  texture.bitmap = pattern_bitmap(8, 8, low, high);
+  texture.uv_scale = {2, 3};
+  return texture;
+}
+
+/// White BSDFs that scatter into a density, smooth to rough.
+std::vector<Named> scattering_bsdfs() {
+  std::vector<Named> result;
+  result.push_back({"diffuse", Diffuse{kWhite}});
+  for (const auto distribution : {Distribution::Beckmann, Distribution::Ggx}) {
+    const std::string kind = distribution == Distribution::Ggx ? "ggx" : "beckmann";
+    for (const double alpha : {0.05, 0.3, 0.8}) {
+      const std::string label = kind + " " + std::to_string(alpha);
+      const Microfacets microfacets{distribution, alpha};
+      result.push_back({"rough conductor " + label, RoughConductor{microfacets}});
+      result.push_back(
+          {"rough dielectric " + label, RoughDielectric{microfacets, 1.5, kWhite, kWhite}});
+    }
+  }
+  result.push_back({"rough dielectric thin", RoughDielectric{{Distribution::Ggx, 0.2}, 1.1}});
+  const Texture half(Rgbd::Constant(0.5));
+  result.push_back({"phong 5", Phong{half, half, 5}});
+  result.push_back({"phong 400", Phong{Texture(Rgbd::Constant(0.2)), half, 400}});
+  result.push_back(
+      {"phong textured", Phong{bitmap_texture(0.1, 0.4), bitmap_texture(0.0, 0.6), 40}});
+  return result;
+}
+
+/// A surface point with a tilted normal, and directions from perpendicular to grazing.
+const SurfacePoint<double> kPoint{Vec3d(0.3, -0.5, 0.8).normalized(), Vec2d(0.37, 0.81)};
+
+std::vector<Vec3d> view_directions(bool both_sides) {
+  std::vector<Vec3d> result;
+  for (const double cosine : {1.0, 0.8, 0.4, 0.1, 0.02}) {
+    const double sine = std::sqrt(1.0 - cosine * cosine);
+    const double phi = 1.0 + 3.0 * cosine;
+    const Vec3d local(sine * std::cos(phi), sine * std::sin(phi), cosine);
+    result.push_back(to_world(local, kPoint.n));
+    if (both_sides) result.push_back(-result.back());
+  }
+  return result;
+}
+
+double eval_luminance(const Bsdf& bsdf, const Vec3d& wi, const Vec3d& wo) {
+  const ScaledColor<double> f = eval(bsdf, kPoint, wi, wo);
+  return std::exp(f.log_scale) * luminance(f.color);
+}
+
+/// Any direction; half of them near the normal's plane.
+Vec3d any_direction(Rng& rng) { return square_to_sphere(rng.uniform(), rng.uniform()); }
+
+// Law: directions are drawn with the density that pdf says; what sample loses is missing there.
+TEST(Bsdf, SampleFollowsPdf) {
+  Rng rng(61, Stream::Test, 0);
+  const std::vector<Named> bsdfs = scattering_bsdfs();
+  const double significance = sidak(0.01, 10 * static_cast<int>(bsdfs.size()));
+  for (const Named& named : bsdfs) {
+    for (const Vec3d& wi : view_directions(is_transmissive(named.bsdf))) {
+      // The pole of the grid is where the sharpest lobe is: the mirror direction.
+      const SphereGrid grid(reflect(wi, kPoint.n), 24, 12, 2.0);
+      const auto draw = [&] {
+        const auto next = sample(named.bsdf, kPoint, wi, rng.uniform3());
+        return next ? next->wo : Vec3d(Vec3d::Zero());
+      };
+      const auto density = [&](const Vec3d& wo) { return pdf(named.bsdf, kPoint, wi, wo); };
+      const ChiSquareResult result = chi_square_directions(grid, 8000, draw, density);
+      EXPECT_GT(result.p_value, significance)
+          << named.name << " cos " << kPoint.n.dot(wi) << " chi^2 " << result.statistic << " of "
+          << result.degrees;
+    }
+  }
+}
+
+// Law: the scattering of a sample says on which side it leaves; opaque BSDFs give nothing behind.
+TEST(Bsdf, SamplesLeaveOnTheSideTheySay) {
+  Rng rng(62, Stream::Test, 0);
+  std::vector<Named> bsdfs = scattering_bsdfs();
+  bsdfs.push_back({"conductor", Conductor{}});
+  bsdfs.push_back({"dielectric", Dielectric{}});
+  for (const Named& named : bsdfs) {
+    for (const Vec3d& wi : view_directions(true)) {
+      const double cos_i = kPoint.n.dot(wi);
+      for (int i = 0; i < 200; ++i) {
+        const auto next = sample(named.bsdf, kPoint, wi, rng.uniform3());
+        if (cos_i < 0.0 && !is_transmissive(named.bsdf)) {
+          EXPECT_FALSE(next.has_value()) << named.name;
+        }
+        if (!next) continue;
+        EXPECT_NEAR(next->wo.norm(), 1.0, 1e-12);
+        const bool same_side = kPoint.n.dot(next->wo) * cos_i > 0.0;
+        EXPECT_EQ(same_side, next->scattering == Scattering::Reflection) << named.name;
+        if (is_delta(named.bsdf)) continue;
+        EXPECT_GT(pdf(named.bsdf, kPoint, wi, next->wo), 0.0) << named.name;
+      }
+    }
+  }
+}
+
+// Law: a white furnace gives back at most what it is lit with. Radiance grows as the square of the
+// index, so that transmitted light counts eta^2 times.
+TEST(Bsdf, WhiteFurnaceGainsNoEnergy) {
+  Rng rng(63, Stream::Test, 0);
+  for (const Named& named : scattering_bsdfs()) {
+    for (const Vec3d& wi : view_directions(is_transmissive(named.bsdf))) {
+      const auto* glass = std::get_if<RoughDielectric>(&named.bsdf);
+      const double inside = glass == nullptr ? 1.0 : glass->eta;
+      const double eta = kPoint.n.dot(wi) > 0.0 ? inside : 1.0 / inside;
+      Moments energy;
+      for (int i = 0; i < 20000; ++i) {
+        const auto next = sample(named.bsdf, kPoint, wi, rng.uniform3());
+        if (!next) {
+          energy.add(0.0);
+          continue;
+        }
+        const double index = next->scattering == Scattering::Transmission ? eta * eta : 1.0;
+        energy.add(index * eval_luminance(named.bsdf, wi, next->wo) /
+                   pdf(named.bsdf, kPoint, wi, next->wo));
+      }
+      EXPECT_LT(energy.mean(), 1.0 + 4.0 * energy.error() + 1e-3)
+          << named.name << " cos " << kPoint.n.dot(wi);
+      // Nor does it lose more than single scattering does.
+      EXPECT_GT(energy.mean(), 0.2) << named.name << " cos " << kPoint.n.dot(wi);
+    }
+  }
+}
+
+// Law: a diffuse BSDF gives back its reflectance, a smooth interface R + (1 - R).
+TEST(Bsdf, LosslessOnesKeepAllEnergy) {
+  Rng rng(64, Stream::Test, 0);
+  const Bsdf glass = Dielectric{1.5, kWhite, kWhite};
+  for (const Vec3d& wi : view_directions(true)) {
+    const double eta = kPoint.n.dot(wi) > 0.0 ? 1.5 : 1.0 / 1.5;
+    const auto energy = [&](Scattering scattering) {
+      const ScaledColor<double> f = eval_delta(glass, kPoint, wi, scattering);
+      const double index = scattering == Scattering::Transmission ? eta * eta : 1.0;
+      const double e = index * std::exp(f.log_scale) * luminance(f.color);
+      // The weight of a delta sample is eval_delta over its probability; here they are equal.
+      EXPECT_NEAR(e, delta_probability(glass, kPoint, wi, scattering), 1e-12);
+      return e;
+    };
+    EXPECT_NEAR(energy(Scattering::Reflection) + energy(Scattering::Transmission), 1.0, 1e-12);
+  }
+  Moments diffuse;
+  const Vec3d wi = view_directions(false)[2];
+  for (int i = 0; i < 100; ++i) {
+    const auto next = sample(Diffuse{kWhite}, kPoint, wi, rng.uniform3());
+    ASSERT_TRUE(next.has_value());
+    diffuse.add(eval_luminance(Diffuse{kWhite}, wi, next->wo) /
+                pdf(Diffuse{kWhite}, kPoint, wi, next->wo));
+  }
+  EXPECT_NEAR(diffuse.mean(), 1.0, 1e-12);
+}
+
+/// f without the cosine, over the square of the index on the side of wi: what is symmetric.
+double symmetric_part(const Bsdf& bsdf, const Vec3d& wi, const Vec3d& wo) {
+  const auto* glass = std::get_if<RoughDielectric>(&bsdf);
+  const double index = glass != nullptr && kPoint.n.dot(wi) < 0.0 ? glass->eta : 1.0;
+  return eval_luminance(bsdf, wi, wo) / (std::abs(kPoint.n.dot(wo)) * index * index);
+}
+
+// Law: reciprocity, f(wi, wo) / eta_i^2 = f(wo, wi) / eta_o^2 (Veach 1997, 5.2), for reflection
+// and transmission.
+TEST(Bsdf, Reciprocity) {
+  Rng rng(65, Stream::Test, 0);
+  for (const Named& named : scattering_bsdfs()) {
+    int positive = 0;
+    for (int i = 0; i < 2000; ++i) {
+      const Vec3d wi = any_direction(rng);
+      Vec3d wo = any_direction(rng);
+      // Sharp lobes are met by sampling only.
+      if (i % 2 == 0)
+        if (const auto next = sample(named.bsdf, kPoint, wi, rng.uniform3())) wo = next->wo;
+      const double forward = symmetric_part(named.bsdf, wi, wo);
+      const double backward = symmetric_part(named.bsdf, wo, wi);
+      // Far in the tails numbers lose their digits.
+      if (forward > 1e-300) {
+        EXPECT_NEAR(forward, backward, 1e-7 * forward) << named.name;
+      }
+      if (forward > 0.0) ++positive;
+    }
+    EXPECT_GT(positive, 300) << named.name;
+  }
+}
+
+// Law: sample never misses light: pdf > 0 wherever eval > 0.
+TEST(Bsdf, PdfCoversEval) {
+  Rng rng(66, Stream::Test, 0);
+  for (const Named& named : scattering_bsdfs()) {
+    for (int i = 0; i < 2000; ++i) {
+      const Vec3d wi = any_direction(rng);
+      const Vec3d wo = any_direction(rng);
+      if (eval_luminance(named.bsdf, wi, wo) > 1e-300) {
+        EXPECT_GT(pdf(named.bsdf, kPoint, wi, wo), 0.0) << named.name;
+      }
+    }
+  }
+}
+
+// Law: where the sampling is exact, eval / pdf is what is left over: the reflectance (diffuse), or
+// F G1(wo) for visible normals (GGX).
+TEST(Bsdf, EvalOverPdfInClosedForm) {
+  Rng rng(67, Stream::Test, 0);
+  const Microfacets ggx{Distribution::Ggx, 0.3};
+  const Bsdf metal = RoughConductor{ggx, {0.2, 0.2, 0.2}, {3, 3, 3}};
+  const Bsdf plaster = Diffuse{Texture(Rgbd::Constant(0.7))};
+  for (const Vec3d& wi : view_directions(false)) {
+    for (int i = 0; i < 100; ++i) {
+      const auto bounce = sample(plaster, kPoint, wi, rng.uniform3());
+      ASSERT_TRUE(bounce.has_value());
+      EXPECT_NEAR(eval_luminance(plaster, wi, bounce->wo) / pdf(plaster, kPoint, wi, bounce->wo),
+                  0.7, 1e-9);
+      const auto next = sample(metal, kPoint, wi, rng.uniform3());
+      if (!next) continue;
+      const double cos_ih = wi.dot((wi + next->wo).normalized());
+      const double expected =
+          fresnel_conductor(cos_ih, 0.2, 3.0) * ggx.g1(kPoint.n.dot(next->wo));
+      EXPECT_NEAR(eval_luminance(metal, wi, next->wo) / pdf(metal, kPoint, wi, next->wo), expected,
+                  1e-7 * expected);
+    }
+  }
+}
+
+// Law: Phong's lobe at the mirror direction is rho_s (n + 2) / (2 pi), beside rho_d / pi.
+TEST(Bsdf, PhongPeak) {
+  const Bsdf phong = Phong{Texture(Rgbd::Constant(0.3)), Texture(Rgbd::Constant(0.5)), 20};
+  const Vec3d wi = view_directions(false)[1];
+  const Vec3d wo = reflect(wi, kPoint.n);
+  EXPECT_NEAR(eval_luminance(phong, wi, wo) / kPoint.n.dot(wo),
+              0.3 / kPi + 0.5 * 22.0 / (2.0 * kPi), 1e-12);
+}
+
+// Law: a delta BSDF sends wi where sample does, has no density, and refraction obeys Snell's law.
+TEST(Bsdf, DeltaDirections) {
+  Rng rng(68, Stream::Test, 0);
+  const Bsdf glass = Dielectric{1.5, kWhite, kWhite};
+  const Bsdf mirror = Conductor{};
+  EXPECT_TRUE(is_delta(glass) && is_delta(mirror));
+  for (const Vec3d& wi : view_directions(true)) {
+    int transmitted = 0;
+    const int count = 4000;
+    for (int i = 0; i < count; ++i) {
+      const auto next = sample(glass, kPoint, wi, rng.uniform3());
+      ASSERT_TRUE(next.has_value());
+      const Vec3d wo = delta_direction(glass, kPoint, wi, next->scattering);
+      EXPECT_LT((wo - next->wo).norm(), 1e-12);
+      EXPECT_EQ(pdf(glass, kPoint, wi, wo), 0.0);
+      EXPECT_FALSE(eval_luminance(glass, wi, wo) > 0.0);
+      if (next->scattering != Scattering::Transmission) continue;
+      ++transmitted;
+      const double eta = kPoint.n.dot(wi) > 0.0 ? 1.5 : 1.0 / 1.5;
+      EXPECT_LT((wi + eta * wo).cross(kPoint.n).norm(), 1e-12);
+    }
+    const double p = delta_probability(glass, kPoint, wi, Scattering::Transmission);
+    EXPECT_NEAR(transmitted, count * p, 4.5 * std::sqrt(count * p * (1.0 - p)) + 1e-9);
+    if (kPoint.n.dot(wi) <= 0.0) continue;
+    EXPECT_LT((delta_direction(mirror, kPoint, wi, Scattering::Reflection) -
+               reflect(wi, kPoint.n)).norm(), 1e-15);
+    EXPECT_EQ(delta_probability(mirror, kPoint, wi, Scattering::Reflection), 1.0);
+  }
+}
+
+}  // namespace
+}  // namespace driftlight::test

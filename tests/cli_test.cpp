@@ -1,0 +1,386 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The program as users meet it: exit codes, messages, files, signals, determinism.
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "driftlight/image.h"
+#include "support/process.h"
+#include "support/scene_directory.h"
+
+namespace driftlight {
+namespace {
+
+using test::Process;
+using test::SceneDirectory;
+
+/// A lit sphere on 24 x 16 pixels.
+const std::string kScene = R"(<scene version="0.6.0">
+  <integrator type="path"><integer name="maxDepth" value="4"/></integrator>
+  <default name="light" value="1"/>
+  <sensor type="perspective">
+    <float name="fov" value="50"/>
+    <transform name="toWorld"><lookat origin="0,1,-5" target="0,0,0" up="0,1,0"/></transform>
+    <film type="hdrfilm">
+      <integer name="width" value="24"/><integer name="height" value="16"/>
+      <rfilter type="box"/>
+    </film>
+  </sensor>
+  <emitter type="constant"><spectrum name="radiance" value="$light"/></emitter>
+  <shape type="sphere"><bsdf type="diffuse"><spectrum name="reflectance" value="0.5"/></bsdf></shape>
+</scene>
+)";
+
+struct Outcome {
+  int exit_code;
+  std::string out;
+  std::string err;
+};
+
+std::size_t count(const std::string& text, const std::string& part) {
+  std::size_t n = 0;
+  for (std::size_t i = text.find(part); i != std::string::npos; i = text.find(part, i + 1)) ++n;
+  return n;
+}
+
+/// Runs the program in a folder of its own that holds scene.xml.
+class Cli : public ::testing::Test {
+ protected:
+  Cli() {
+    std::filesystem::create_directory(folder());
+    write("scene.xml", kScene);
+  }
+
+  std::filesystem::path folder() const { return directory_.path() / "work"; }
+
+  void write(const std::string& name, const std::string& content) const {
+    std::ofstream(folder() / name, std::ios::binary) << content;
+  }
+  std::string read(const std::string& name) const {
+    std::ostringstream text;
+    text << std::ifstream(folder() / name, std::ios::binary).rdbuf();
+    return text.str();
+  }
+  std::set<std::string> files() const {
+    std::set<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder()))
+      names.insert(entry.path().filename().string());
+    return names;
+  }
+
+  static std::vector<std::string> command(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), DRIFTLIGHT_CLI);
+    return arguments;
+  }
+  Outcome run(const std::vector<std::string>& arguments) const {
+    Process process(command(arguments), folder(), directory_.path());
+    const int exit_code = process.exit_code();
+    return {exit_code, process.standard_output(), process.standard_error()};
+  }
+  Process on_terminal(const std::vector<std::string>& arguments) const {
+    return {command(arguments), folder(), directory_.path(), Process::Stderr::Terminal};
+  }
+
+ private:
+  SceneDirectory directory_;
+};
+
+// --- Mistakes ------------------------------------------------------------------------------------
+
+struct Mistake {
+  std::vector<std::string> arguments;
+  std::vector<std::string> fragments;  ///< of the message
+};
+
+/// `--output` with an image in the folder is put before the arguments of each.
+const std::vector<Mistake> kRenderMistakes{
+    {{"missing.xml"}, {"missing.xml"}},
+    {{"broken.xml"}, {"broken.xml:"}},
+    {{"scene.xml", "--integrator", "photons"}, {"'photons'", "langevin", "path"}},
+    {{"scene.xml", "--set", "speed=1"}, {"'speed'", "drift", "epsilon"}},
+    {{"scene.xml", "--set", "drift=sideways"}, {"drift", "'sideways'", "none|gradient|full"}},
+    {{"scene.xml", "--set", "epsilon=-1"}, {"epsilon", "'-1'", "> 0"}},
+    {{"scene.xml", "--set", "max_depth=17"}, {"max_depth", "'17'", "[1, 16]"}},
+    {{"scene.xml", "--integrator", "path", "--set", "drift=none"}, {"'drift'", "max_depth"}},
+    {{"scene.xml", "--set", "epsilon"}, {"--set", "'epsilon'", "name=value"}},
+    {{"scene.xml", "-D", "light"}, {"-D", "'light'", "name=value"}},
+    {{"scene.xml", "-D", "light=bright"}, {"scene.xml:", "bright"}},
+    {{"scene.xml", "--time", "soon"}, {"--time", "'soon'", "> 0"}},
+    {{"scene.xml", "--time", "0"}, {"--time", "'0'", "> 0"}},
+    {{"scene.xml", "--time", "-3"}, {"--time", "'-3'", "> 0"}},
+    {{"scene.xml", "--time", "nan"}, {"--time", "'nan'", "> 0"}},
+    {{"scene.xml", "--time", "inf"}, {"--time", "'inf'", "> 0"}},
+    {{"scene.xml", "--time", "5s"}, {"--time", "'5s'", "> 0"}},
+    {{"scene.xml", "--mutations-per-pixel", "1e999"}, {"--mutations-per-pixel", "'1e999'"}},
+    {{"scene.xml", "--integrator", "path", "--spp", "1.5"}, {"--spp", "'1.5'", "integer"}},
+    {{"scene.xml", "--integrator", "path", "--spp", "0"}, {"--spp", "'0'", "from 1"}},
+    {{"scene.xml", "--threads", "-1"}, {"--threads", "'-1'", "from 0"}},
+    {{"scene.xml", "--seed", "-1"}, {"--seed", "'-1'", "from 0"}},
+    {{"scene.xml", "--seed", "0x10"}, {"--seed", "'0x10'"}},
+    {{"scene.xml", "--spp", "4"}, {"--spp", "path", "--mutations-per-pixel"}},
+    {{"scene.xml", "--integrator", "path", "--mutations-per-pixel", "4"},
+     {"--mutations-per-pixel", "langevin", "--spp"}},
+    {{"scene.xml", "--time", "1", "--mutations-per-pixel", "4"}, {"only one", "--time"}},
+    {{"scene.xml", "--integrator", "path", "--time", "1", "--spp", "4"}, {"only one", "--spp"}},
+    {{"scene.xml", "-v", "-q"}, {"-v", "-q"}},
+    {{"scene.xml", "-o", "nowhere/b.exr"}, {"nowhere"}},
+    {{"scene.xml", "-o", "b.xyz"}, {"b.xyz", "'.xyz'", ".exr"}},
+    {{"scene.xml", "--stats", "nowhere/stats.json"}, {"nowhere"}},
+    {{"scene.xml", "another.xml"}, {"another.xml"}},
+    {{"scene.xml", "--fast"}, {"--fast"}},
+    {{"scene.xml", "--seed"}, {"--seed"}},
+    {{}, {"scene"}},
+};
+
+TEST_F(Cli, MistakesInARenderAreNamedAndLeaveNoImage) {
+  write("broken.xml", "<scene version=\"0.6.0\">\n  <shape type=\"sphere\">\n</scene>\n");
+  const std::set<std::string> before = files();
+  for (const Mistake& mistake : kRenderMistakes) {
+    std::vector<std::string> arguments{"render", "-o", "a.exr"};
+    arguments.insert(arguments.end(), mistake.arguments.begin(), mistake.arguments.end());
+    const Outcome outcome = run(arguments);
+    std::string line;
+    for (const std::string& argument : arguments) line += argument + " ";
+    SCOPED_TRACE(line);
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_EQ(outcome.err.rfind("driftlight: error: ", 0), 0U) << outcome.err;
+    EXPECT_EQ(count(outcome.err, "error:"), 1U) << outcome.err;
+    for (const std::string& fragment : mistake.fragments)
+      EXPECT_NE(outcome.err.find(fragment), std::string::npos) << outcome.err;
+    EXPECT_EQ(files(), before);
+  }
+}
+
+TEST_F(Cli, OtherMistakesHaveTheSameExitCode) {
+  write("text.exr", "not an image");
+  write_image(folder() / "small.exr", Image(2, 2));
+  write_image(folder() / "large.exr", Image(3, 2));
+  const std::vector<std::vector<std::string>> lines{
+      {},
+      {"draw"},
+      {"info"},
+      {"info", "scene.xml", "--integrators"},
+      {"info", "missing.xml"},
+      {"diff"},
+      {"diff", "small.exr"},
+      {"diff", "small.exr", "missing.exr"},
+      {"diff", "small.exr", "text.exr"},
+      {"diff", "small.exr", "large.exr"},
+  };
+  for (const auto& arguments : lines) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << ::testing::PrintToString(arguments);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_EQ(outcome.err.rfind("driftlight: error: ", 0), 0U) << outcome.err;
+  }
+}
+
+TEST_F(Cli, AMistakeLeavesAnOlderImageAlone) {
+  write("a.exr", "an old file");
+  EXPECT_EQ(run({"render", "missing.xml", "-o", "a.exr"}).exit_code, 2);
+  EXPECT_EQ(read("a.exr"), "an old file");
+}
+
+// --- Help and inventories ------------------------------------------------------------------------
+
+TEST_F(Cli, HelpAndVersionSucceed) {
+  EXPECT_EQ(run({"--version"}).out.rfind("driftlight ", 0), 0U);
+  for (const auto& arguments : std::vector<std::vector<std::string>>{
+           {"--help"}, {"render", "--help"}, {"info", "--help"}, {"diff", "-h"}}) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0);
+    EXPECT_NE(outcome.out.find("Usage"), std::string::npos) << outcome.out;
+    EXPECT_EQ(outcome.err, "");
+  }
+}
+
+TEST_F(Cli, InfoCountsTheSceneAndListsTheIntegrators) {
+  const Outcome scene = run({"info", "scene.xml", "-D", "light=2"});
+  EXPECT_EQ(scene.exit_code, 0) << scene.err;
+  for (const char* part : {"24 x 16", "4 edges", "1 sphere", "1 diffuse", "1 constant"})
+    EXPECT_NE(scene.out.find(part), std::string::npos) << part << " in\n" << scene.out;
+  const Outcome integrators = run({"info", "--integrators"});
+  EXPECT_EQ(integrators.exit_code, 0) << integrators.err;
+  for (const char* part : {"langevin: ", "path: ", "drift", "none|gradient|full", "epsilon",
+                           "default 0.1", "max_depth", "doi"})
+    EXPECT_NE(integrators.out.find(part), std::string::npos) << part << integrators.out;
+}
+
+TEST_F(Cli, DiffPrintsTheFigures) {
+  Image a(4, 2);
+  Image b(4, 2);
+  a.rgb.assign(a.rgb.size(), 3.0F);
+  b.rgb.assign(b.rgb.size(), 2.0F);
+  write_image(folder() / "a.exr", a);
+  write_image(folder() / "b.pfm", b);
+  const Outcome text = run({"diff", "a.exr", "b.pfm"});
+  EXPECT_EQ(text.exit_code, 0) << text.err;
+  for (const char* part : {"MSE             1\n", "0.249377", "0.497512", "mean ratio      1.5\n"})
+    EXPECT_NE(text.out.find(part), std::string::npos) << part << " in\n" << text.out;
+  const Outcome json = run({"diff", "a.exr", "b.pfm", "--json"});
+  EXPECT_EQ(json.exit_code, 0) << json.err;
+  const auto figures = nlohmann::json::parse(json.out);
+  EXPECT_NEAR(figures.at("mse").get<double>(), 1.0, 1e-12);
+  EXPECT_NEAR(figures.at("relmse").get<double>(), 1.0 / 4.01, 1e-12);
+  EXPECT_NEAR(figures.at("relmse_trimmed").get<double>(), 1.0 / 4.01, 1e-12);
+  EXPECT_NEAR(figures.at("mape").get<double>(), 1.0 / 2.01, 1e-12);
+  EXPECT_NEAR(figures.at("mean_ratio").get<double>(), 1.5, 1e-12);
+}
+
+// --- Renders -------------------------------------------------------------------------------------
+
+TEST_F(Cli, RendersIntoEveryFileThatWasAskedFor) {
+  const Outcome outcome =
+      run({"render", "scene.xml", "-o", "a.exr", "-o", "a.png", "-oa.pfm", "--stats", "s.json",
+           "--mutations-per-pixel", "20", "--set", "drift=full", "-t", "2", "--seed", "5", "-v"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(files(), (std::set<std::string>{"a.exr", "a.pfm", "a.png", "s.json", "scene.xml"}));
+  const Image image = read_image(folder() / "a.exr");
+  EXPECT_EQ(image.width, 24);
+  EXPECT_EQ(image.height, 16);
+  EXPECT_EQ(image.rgb, read_image(folder() / "a.pfm").rgb);
+  for (const char* part : {"langevin", "wrote a.exr", "wrote a.png", "large steps", "acceptance"})
+    EXPECT_NE(outcome.out.find(part), std::string::npos) << part << " in\n" << outcome.out;
+
+  const auto json = nlohmann::json::parse(read("s.json"));
+  EXPECT_EQ(json.at("integrator"), "langevin");
+  EXPECT_EQ(json.at("options").at("drift"), "full");
+  EXPECT_EQ(json.at("options").at("max_depth"), 4);
+  EXPECT_EQ(json.at("seed"), 5);
+  EXPECT_EQ(json.at("threads"), 2);
+  EXPECT_EQ(json.at("image").at("width"), 24);
+  EXPECT_GT(json.at("b").get<double>(), 0.0);
+  EXPECT_GT(json.at("b_error").get<double>(), 0.0);
+  const auto mutations = json.at("mutations").get<std::uint64_t>();
+  EXPECT_GE(mutations, 20U * 24U * 16U);
+  const auto& kernels = json.at("kernels");
+  EXPECT_EQ(kernels.at("large_step").at("proposed").get<std::uint64_t>() +
+                kernels.at("small_step").at("proposed").get<std::uint64_t>(),
+            mutations);
+  for (const char* reason : {"missed", "other_lobe", "occluded", "non_finite", "hastings"})
+    EXPECT_TRUE(json.at("rejections").contains(reason)) << reason;
+  std::uint64_t spent = 0;
+  for (const auto& n : json.at("path_lengths")) spent += n.get<std::uint64_t>();
+  EXPECT_EQ(spent, mutations);
+  for (const char* phase : {"load", "bootstrap", "render", "write"})
+    EXPECT_GE(json.at("seconds").at(phase).get<double>(), 0.0) << phase;
+}
+
+TEST_F(Cli, PathTracerReportsItsSamples) {
+  const Outcome outcome =
+      run({"render", "scene.xml", "--integrator", "path", "--spp", "3", "-q", "--stats", "s.json"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_EQ(outcome.err, "");
+  // The default name is that of the scene.
+  EXPECT_EQ(files(), (std::set<std::string>{"s.json", "scene.exr", "scene.xml"}));
+  const auto json = nlohmann::json::parse(read("s.json"));
+  EXPECT_EQ(json.at("integrator"), "path");
+  EXPECT_EQ(json.at("samples_per_pixel"), 3.0);
+  EXPECT_EQ(json.at("options").at("max_depth"), 4);
+}
+
+TEST_F(Cli, DefinesReachTheScene) {
+  for (const char* light : {"1", "3"}) {
+    const std::string file = std::string(light) + ".exr";
+    ASSERT_EQ(run({"render", "scene.xml", "-D", std::string("light=") + light, "-o", file,
+                   "--integrator", "path", "--spp", "4"})
+                  .exit_code,
+              0);
+  }
+  const Difference d = difference(read_image(folder() / "3.exr"), read_image(folder() / "1.exr"));
+  EXPECT_NEAR(d.mean, 3.0, 1e-5);
+}
+
+TEST_F(Cli, TheSceneDepthIsLimitedWithANotice) {
+  std::string deep = kScene;
+  deep.replace(deep.find("value=\"4\""), 9, "value=\"40\"");
+  write("deep.xml", deep);
+  const std::vector<std::string> arguments{"render", "deep.xml", "--mutations-per-pixel",
+                                           "1",      "--stats",  "s.json"};
+  const Outcome outcome = run(arguments);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("40 edges"), std::string::npos) << outcome.err;
+  EXPECT_EQ(nlohmann::json::parse(read("s.json")).at("options").at("max_depth"), 16);
+
+  std::vector<std::string> with_depth = arguments;
+  with_depth.insert(with_depth.end(), {"--set", "max_depth=3"});
+  EXPECT_EQ(run(with_depth).err, "");
+  EXPECT_EQ(nlohmann::json::parse(read("s.json")).at("options").at("max_depth"), 3);
+}
+
+TEST_F(Cli, TheSameSeedGivesTheSameBytesOnAnyNumberOfThreads) {
+  const std::vector<std::vector<std::string>> integrators{
+      {"--integrator", "langevin", "--mutations-per-pixel", "50"},
+      {"--integrator", "path", "--spp", "4"},
+  };
+  for (const auto& integrator : integrators) {
+    const auto bytes = [&](const char* threads, const char* seed) {
+      std::vector<std::string> arguments{"render", "scene.xml", "-o",     "a.exr",
+                                         "-t",     threads,     "--seed", seed};
+      arguments.insert(arguments.end(), integrator.begin(), integrator.end());
+      EXPECT_EQ(run(arguments).exit_code, 0);
+      return read("a.exr");
+    };
+    const std::string one = bytes("1", "9");
+    EXPECT_GT(one.size(), 100U);
+    EXPECT_TRUE(one == bytes("1", "9"));
+    EXPECT_TRUE(one == bytes("2", "9"));
+    EXPECT_TRUE(one == bytes("4", "9"));
+    EXPECT_FALSE(one == bytes("2", "10"));
+  }
+}
+
+TEST_F(Cli, TimeEndsTheRender) {
+  for (const char* integrator : {"langevin", "path"}) {
+    const auto start = std::chrono::steady_clock::now();
+    const Outcome outcome = run({"render", "scene.xml", "--integrator", integrator, "--time", "1",
+                                 "-o", "a.exr", "--stats", "s.json"});
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_GT(elapsed.count(), 0.9);
+    EXPECT_LT(elapsed.count(), 20.0);
+    EXPECT_EQ(read_image(folder() / "a.exr").width, 24);
+    EXPECT_EQ(nlohmann::json::parse(read("s.json")).at("stopped"), false);
+  }
+}
+
+TEST_F(Cli, ASignalEndsTheRenderWithTheImageSoFar) {
+  for (const auto& [integrator, signal] :
+       {std::pair("langevin", SIGINT), std::pair("path", SIGTERM)}) {
+    Process process = on_terminal({"render", "scene.xml", "--integrator", integrator, "--time",
+                                   "3600", "-o", "a.exr", "--stats", "s.json"});
+    // The bar counts down from an hour: a second has passed.
+    ASSERT_TRUE(process.wait_for(" 59:59 left", std::chrono::seconds(60)))
+        << process.standard_error();
+    process.send(signal);
+    EXPECT_EQ(process.exit_code(), 0);
+    EXPECT_NE(process.standard_error().find("stopped early"), std::string::npos)
+        << process.standard_error();
+    const Image image = read_image(folder() / "a.exr");
+    float sum = 0;
+    for (const float x : image.rgb) sum += x;
+    EXPECT_GT(sum, 0.0F);
+    EXPECT_EQ(nlohmann::json::parse(read("s.json")).at("stopped"), true);
+    EXPECT_EQ(files(), (std::set<std::string>{"a.exr", "s.json", "scene.xml"}));
+    std::filesystem::remove(folder() / "a.exr");
+    std::filesystem::remove(folder() / "s.json");
+  }
+}
+
+TEST_F(Cli, ProgressIsForTerminalsOnly) {
+  EXPECT_EQ(run({"render", "scene.xml", "--time", "0.3"}).err.find('%'), std::string::npos);
+  Process quiet = on_terminal({"render", "scene.xml", "--time", "0.3", "-q"});
+  EXPECT_EQ(quiet.exit_code(), 0);
+  EXPECT_EQ(quiet.standard_error(), "");
+}
+
+}  // namespace
+}  // namespace driftlight

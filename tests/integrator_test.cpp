@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Whole images: the Langevin sampler against path tracing, both against closed forms and against
+/// an independent renderer.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "driftlight/image.h"
+#include "driftlight/render.h"
+#include "driftlight/scene_file.h"
+#include "support/t_test.h"
+
+namespace driftlight {
+namespace {
+
+constexpr int kRuns = 20;
+constexpr int kTile = 8;
+
+LoadedScene load_small(const std::string& name) {
+  LoadOptions options;
+  options.defines = {{"width", "32"}, {"height", "24"}};
+  return load_scene(std::filesystem::path(DRIFTLIGHT_SCENE_DIR) / (name + ".xml"), options);
+}
+
+/// Mean luminance of each tile of kTile x kTile pixels.
+std::vector<double> tile_means(const Image& image) {
+  std::vector<double> means;
+  for (int top = 0; top + kTile <= image.height; top += kTile)
+    for (int left = 0; left + kTile <= image.width; left += kTile) {
+      double sum = 0;
+      for (int y = top; y < top + kTile; ++y)
+        for (int x = left; x < left + kTile; ++x) {
+          const float* p = image.pixel(x, y);
+          sum += luminance(Rgbd(static_cast<double>(p[0]), static_cast<double>(p[1]),
+                                static_cast<double>(p[2])));
+        }
+      means.push_back(sum / (kTile * kTile));
+    }
+  return means;
+}
+
+/// Tile means over independent runs; render(seed) is one run.
+template <class Render>
+std::vector<test::Moments> tiles_over_runs(const Render& render) {
+  std::vector<test::Moments> tiles;
+  for (int run = 0; run < kRuns; ++run) {
+    const std::vector<double> means = tile_means(render(static_cast<std::uint64_t>(run)));
+    tiles.resize(means.size());
+    for (std::size_t i = 0; i < means.size(); ++i) tiles[i].add(means[i]);
+  }
+  return tiles;
+}
+
+struct Configuration {
+  const char* name;
+  Drift drift;
+};
+
+struct Work {
+  const char* scene;
+  int samples_per_pixel;
+  double mutations_per_pixel;
+};
+
+class LangevinEqualsPath : public testing::TestWithParam<std::tuple<Work, Configuration>> {};
+
+/// The means of independent images agree tile by tile: Welch's test, Sidak-corrected at 1 %.
+TEST_P(LangevinEqualsPath, TileMeans) {
+  const auto& [work, configuration] = GetParam();
+  const LoadedScene loaded = load_small(work.scene);
+  const int max_depth = loaded.max_depth.value();
+  LangevinOptions langevin;
+  langevin.max_depth = max_depth;
+  langevin.kernel.drift = configuration.drift;
+  const auto sampled = tiles_over_runs([&, &w = work](std::uint64_t seed) {
+    RenderOptions render;
+    render.seed = seed;
+    return render_langevin(loaded.scene, langevin, render, w.mutations_per_pixel).image;
+  });
+  const auto traced = tiles_over_runs([&, &w = work](std::uint64_t seed) {
+    RenderOptions render;
+    render.seed = 1000 + seed;
+    return render_path(loaded.scene, {max_depth}, render, w.samples_per_pixel).image;
+  });
+  const double level = test::sidak(0.01, static_cast<int>(sampled.size()));
+  for (std::size_t i = 0; i < sampled.size(); ++i)
+    EXPECT_GT(test::welch_p_value(sampled[i], traced[i]), level)
+        << "tile " << i << ": langevin " << sampled[i].mean() << " +- " << sampled[i].error()
+        << ", path " << traced[i].mean() << " +- " << traced[i].error();
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Scenes, LangevinEqualsPath,
+    testing::Combine(testing::Values(Work{"furnace_sphere", 64, 200},
+                                     Work{"cornell_glossy", 500, 600},
+                                     Work{"glass_caustic", 1500, 600},
+                                     Work{"small_hole", 600, 600},
+                                     Work{"glossy_chain", 1000, 600}),
+                     testing::Values(Configuration{"brownian", Drift::None},
+                                     Configuration{"gradient", Drift::Gradient},
+                                     Configuration{"divergence", Drift::Full})),
+    [](const auto& instance) {
+      return std::string(std::get<0>(instance.param).scene) + "_" + std::get<1>(instance.param).name;
+    });
+
+/// A closed sphere of radiance L and albedo rho shows L (1 - rho^n) / (1 - rho) everywhere.
+TEST(ClosedSphere, HasItsClosedForm) {
+  const LoadedScene loaded = load_small("furnace_sphere");
+  const double expected = 0.5 * (1.0 - std::pow(0.5, 6)) / 0.5;
+  RenderOptions render;
+  const Image traced = render_path(loaded.scene, {6}, render, 64).image;
+  for (const float value : traced.rgb) EXPECT_NEAR(static_cast<double>(value), expected, 1e-4);
+
+  LangevinOptions langevin;
+  langevin.max_depth = 6;
+  const auto tiles = tiles_over_runs([&](std::uint64_t seed) {
+    render.seed = seed;
+    return render_langevin(loaded.scene, langevin, render, 300).image;
+  });
+  const double level = test::sidak(0.01, static_cast<int>(tiles.size()));
+  for (const test::Moments& tile : tiles) {
+    EXPECT_NEAR(tile.mean(), expected, 0.01 * expected);
+    EXPECT_GT(test::student_p_value(tile, expected), level);
+  }
+}
+
+/// Ratios of block means to those of an image by another renderer.
+class SharedReference : public testing::Test {
+ protected:
+  static constexpr int kBlock = 16;
+
+  void load(const std::string& name) {
+    const std::filesystem::path shared(DRIFTLIGHT_SHARED_DIR);
+    const auto file = shared / "scenes" / name / "scene.xml";
+    const auto reference = shared / "references" / (name + ".exr");
+    if (!std::filesystem::exists(file) || !std::filesystem::exists(reference))
+      GTEST_SKIP() << "the shared scene " << name << " is not here";
+    scene_.emplace(load_scene(file));
+    reference_ = read_image(reference);
+  }
+
+  Image render(int samples_per_pixel, std::uint64_t seed = 1) const {
+    RenderOptions options;
+    options.seed = seed;
+    return render_path(scene_->scene, {scene_->max_depth.value()}, options, samples_per_pixel)
+        .image;
+  }
+
+  /// Ratios image / reference of the sums over blocks and the channels [first, last), sorted.
+  std::vector<double> block_ratios(const Image& image, int first = 0, int last = 3) const {
+    std::vector<double> ratios;
+    for (int top = 0; top + kBlock <= image.height; top += kBlock)
+      for (int left = 0; left + kBlock <= image.width; left += kBlock)
+        ratios.push_back(block_sum(image, left, top, first, last) /
+                         block_sum(reference_, left, top, first, last));
+    std::sort(ratios.begin(), ratios.end());
+    return ratios;
+  }
+
+  std::optional<LoadedScene> scene_;
+  Image reference_;
+
+ private:
+  static double block_sum(const Image& image, int left, int top, int first, int last) {
+    double sum = 0;
+    for (int y = top; y < top + kBlock; ++y)
+      for (int x = left; x < left + kBlock; ++x)
+        for (int c = first; c < last; ++c) sum += static_cast<double>(image.pixel(x, y)[c]);
+    return sum;
+  }
+};
+
+double median(const std::vector<double>& sorted) { return sorted[sorted.size() / 2]; }
+
+TEST_F(SharedReference, CboxGlossy) {
+  ASSERT_NO_FATAL_FAILURE(load("cbox_glossy"));
+  if (IsSkipped()) return;
+  const Image image = render(256);
+  EXPECT_NEAR(median(block_ratios(image)), 1.0, 0.01);
+  EXPECT_NEAR(difference(image, reference_).mean, 1.0, 0.01);
+}
+
+TEST_F(SharedReference, Torus) {
+  ASSERT_NO_FATAL_FAILURE(load("torus"));
+  if (IsSkipped()) return;
+  EXPECT_NEAR(median(block_ratios(render(400))), 1.0, 0.01);
+}
+
+}  // namespace
+}  // namespace driftlight
