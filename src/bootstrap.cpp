@@ -42,10 +42,10 @@ std::vector<WeightedEntry> draw(const PathSampler& sampler, const Scene& scene, 
 Bootstrap::Bootstrap(PathSampler& sampler, const Scene& scene, int count, std::uint64_t seed)
     : sampler_(sampler), seed_(seed) {
   const auto samples = static_cast<std::size_t>(count);
-  std::vector<double> squares(static_cast<std::size_t>(sampler.entry_count()));
+  std::vector<RunningMean> by_entry(static_cast<std::size_t>(sampler.entry_count()));
   for (const WeightedEntry& e : draw(sampler, scene, samples, seed, Stream::Pilot))
-    squares[static_cast<std::size_t>(e.entry)] += e.weight * e.weight;
-  sampler.learn(squares);
+    by_entry[static_cast<std::size_t>(e.entry)].add(e.weight);
+  sampler.learn(by_entry);
   weights_.reserve(samples);
   for (const WeightedEntry& e : draw(sampler, scene, samples, seed, Stream::Bootstrap)) {
     weights_.push_back(e.weight);

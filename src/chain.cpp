@@ -6,20 +6,6 @@
 
 namespace driftlight {
 
-RunningMean& RunningMean::operator+=(const RunningMean& other) {
-  count += other.count;
-  sum += other.sum;
-  sum_of_squares += other.sum_of_squares;
-  return *this;
-}
-
-double RunningMean::error() const {
-  if (count < 2) return std::numeric_limits<double>::infinity();
-  const auto n = static_cast<double>(count);
-  const double variance = std::max(0.0, sum_of_squares / n - mean() * mean());
-  return std::sqrt(variance / (n - 1.0));
-}
-
 double log_acceptance(double log_target_from, double log_target_to, double log_pdf_forward,
                       double log_pdf_reverse) {
   const double log_ratio = log_target_to - log_target_from + log_pdf_reverse - log_pdf_forward;

@@ -61,9 +61,9 @@ std::unique_ptr<OIIO::ImageOutput> make_output(const std::filesystem::path& file
   if (!output) {
     OIIO::geterror();  // forgets the message
     throw InputError(
-        fmt::format("cannot write '{}': no image format ends in '{}'; .exr, .pfm, "
-                    ".hdr, .png, .jpg and .tif are some that do",
-                    file.string(), file.extension().string()));
+        fmt::format("cannot write '{}': its ending names no image format that can be written; "
+                    ".exr, .pfm, .hdr, .png, .jpg and .tif do",
+                    file.string()));
   }
   return output;
 }

@@ -79,15 +79,19 @@ PathSampler::PathSampler(const Scene& scene, int max_depth)
       max_depth_(max_depth),
       table_(std::vector<double>(static_cast<std::size_t>(2 * max_depth - 1), 1.0)) {}
 
-void PathSampler::learn(const std::vector<double>& squared_weights) {
-  double total = 0;
-  for (const double w2 : squared_weights) total += std::sqrt(w2);
-  if (!(total > 0.0)) return;
-  std::vector<double> weights;
-  for (const double w2 : squared_weights)
-    weights.push_back(0.9 * std::sqrt(w2) / total +
-                      0.1 / static_cast<double>(squared_weights.size()));
-  table_ = DiscreteDistribution(weights);
+void PathSampler::learn(const std::vector<RunningMean>& weights) {
+  double energy = 0;
+  double spread = 0;
+  for (const RunningMean& w : weights) {
+    energy += w.sum;
+    spread += std::sqrt(w.sum_of_squares);
+  }
+  if (!(energy > 0.0)) return;
+  std::vector<double> probabilities;
+  for (const RunningMean& w : weights)
+    probabilities.push_back(0.45 * w.sum / energy + 0.45 * std::sqrt(w.sum_of_squares) / spread +
+                            0.1 / static_cast<double>(weights.size()));
+  table_ = DiscreteDistribution(probabilities);
 }
 
 std::optional<PathSampler::Sample> PathSampler::sample(Rng& rng) const {

@@ -130,7 +130,7 @@ const std::vector<Mistake> kRenderMistakes{
     {{"scene.xml", "--integrator", "path", "--time", "1", "--spp", "4"}, {"only one", "--spp"}},
     {{"scene.xml", "-v", "-q"}, {"-v", "-q"}},
     {{"scene.xml", "-o", "nowhere/b.exr"}, {"nowhere"}},
-    {{"scene.xml", "-o", "b.xyz"}, {"b.xyz", "'.xyz'", ".exr"}},
+    {{"scene.xml", "-o", "b.xyz"}, {"b.xyz", "ending", ".exr"}},
     {{"scene.xml", "--stats", "nowhere/stats.json"}, {"nowhere"}},
     {{"scene.xml", "another.xml"}, {"another.xml"}},
     {{"scene.xml", "--fast"}, {"--fast"}},
@@ -209,7 +209,7 @@ TEST_F(Cli, InfoCountsTheSceneAndListsTheIntegrators) {
   const Outcome integrators = run({"info", "--integrators"});
   EXPECT_EQ(integrators.exit_code, 0) << integrators.err;
   for (const char* part : {"langevin: ", "path: ", "drift", "none|gradient|full", "epsilon",
-                           "default 0.1", "max_depth", "doi"})
+                           "max_depth", "doi"})
     EXPECT_NE(integrators.out.find(part), std::string::npos) << part << integrators.out;
 }
 

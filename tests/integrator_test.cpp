@@ -65,6 +65,7 @@ struct Work {
   const char* scene;
   int samples_per_pixel;
   double mutations_per_pixel;
+  int bootstrap;
 };
 
 class LangevinEqualsPath : public testing::TestWithParam<std::tuple<Work, Configuration>> {};
@@ -77,6 +78,7 @@ TEST_P(LangevinEqualsPath, TileMeans) {
   LangevinOptions langevin;
   langevin.max_depth = max_depth;
   langevin.kernel.drift = configuration.drift;
+  langevin.bootstrap = work.bootstrap;
   const auto sampled = tiles_over_runs([&, &w = work](std::uint64_t seed) {
     RenderOptions render;
     render.seed = seed;
@@ -96,11 +98,11 @@ TEST_P(LangevinEqualsPath, TileMeans) {
 
 INSTANTIATE_TEST_SUITE_P(
     Scenes, LangevinEqualsPath,
-    testing::Combine(testing::Values(Work{"furnace_sphere", 64, 200},
-                                     Work{"cornell_glossy", 500, 600},
-                                     Work{"glass_caustic", 1500, 600},
-                                     Work{"small_hole", 600, 600},
-                                     Work{"glossy_chain", 1000, 600}),
+    testing::Combine(testing::Values(Work{"furnace_sphere", 64, 200, 50000},
+                                     Work{"cornell_glossy", 500, 500, 100000},
+                                     Work{"glass_caustic", 1500, 500, 100000},
+                                     Work{"small_hole", 500, 500, 200000},
+                                     Work{"glossy_chain", 800, 500, 400000}),
                      testing::Values(Configuration{"brownian", Drift::None},
                                      Configuration{"gradient", Drift::Gradient},
                                      Configuration{"divergence", Drift::Full})),
@@ -118,6 +120,7 @@ TEST(ClosedSphere, HasItsClosedForm) {
 
   LangevinOptions langevin;
   langevin.max_depth = 6;
+  langevin.bootstrap = 50000;
   const auto tiles = tiles_over_runs([&](std::uint64_t seed) {
     render.seed = seed;
     return render_langevin(loaded.scene, langevin, render, 300).image;

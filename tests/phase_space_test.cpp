@@ -235,7 +235,7 @@ struct Stage {
     builder.add_shape(quad({-2, 0, 2}, {4, 0, 0}, {0, 0, -4}), white);
     builder.add_shape(quad({-2, 2, -1}, {1, 0, 0}, {0, 0, 1}), white, Rgbd::Ones());
     builder.add_shape(quad({1, 0.1, 1}, {1, 0, 0}, {0, 0, -1}), mirror);
-    builder.add_shape(quad({-0.5, 0.5, -2}, {0, 0, 4}, {0, 1, 0}), white);
+    builder.add_shape(quad({-0.5, 0.5, -2}, {0, 0, 3}, {0, 1, 0}), white);
     builder.set_camera(look_at({0, 1, 4}, {0, 0, 0}, 1.0));
     return builder.build();
   }

@@ -11,25 +11,9 @@
 #include "driftlight/kernel.h"
 #include "driftlight/path_sampler.h"
 #include "driftlight/render.h"
+#include "driftlight/running_mean.h"
 
 namespace driftlight {
-
-/// Mean and variance of independent numbers.
-struct RunningMean {
-  std::uint64_t count = 0;
-  double sum = 0;
-  double sum_of_squares = 0;
-
-  void add(double x) {
-    ++count;
-    sum += x;
-    sum_of_squares += x * x;
-  }
-  RunningMean& operator+=(const RunningMean& other);
-  double mean() const { return count > 0 ? sum / static_cast<double>(count) : 0; }
-  /// Standard error of the mean.
-  double error() const;
-};
 
 /// A path with all that the kernels know of it.
 struct ChainState {

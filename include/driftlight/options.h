@@ -29,7 +29,7 @@ struct KernelOptions {
   Drift drift = Drift::Gradient;
   PreconditionerKind preconditioner = PreconditionerKind::Constraints;
   /// Of (E63.8): dt |(a, grad U)| <= epsilon.
-  double epsilon = 0.1;
+  double epsilon = 10;
   /// dt is divided by it.
   double safety = 1;
   /// Upper bound of dt; 1/3 is that of (E63.9).
@@ -48,7 +48,7 @@ struct LangevinOptions {
   /// Independent chains, whatever the number of threads.
   int chains = 128;
   /// Samples that estimate the normalization b and start the chains.
-  int bootstrap = 100000;
+  int bootstrap = 500000;
   /// Longest path, in edges.
   int max_depth = 12;
 

@@ -9,6 +9,7 @@
 #include "driftlight/contribution.h"
 #include "driftlight/phase_space.h"
 #include "driftlight/random.h"
+#include "driftlight/running_mean.h"
 #include "driftlight/warp.h"
 
 namespace driftlight {
@@ -37,12 +38,12 @@ class PathSampler {
   };
 
   int entry_count() const { return table_.size(); }
-  /// Replaces the table, given sums by entry of (f / q)^2 over samples from the uniform one:
-  /// probabilities in proportion to their square roots, which minimises the variance of E[f / q]
-  /// (Neyman's allocation: a strategy that scores rarely but heavily is tried more often than its
-  /// energy alone would ask for), mixed with a tenth of the uniform one so that nothing becomes
-  /// impossible.
-  void learn(const std::vector<double>& squared_weights);
+  /// Replaces the table, given the weights f / q by entry of samples from the uniform one. Nearly
+  /// half of the attempts go by energy, which gives large steps that are accepted; as many by the
+  /// root of the second moment, which minimises the variance of b (Neyman's allocation: what scores
+  /// rarely but heavily needs more attempts than its energy asks for); a tenth is uniform, so that
+  /// nothing becomes impossible.
+  void learn(const std::vector<RunningMean>& weights);
 
   /// None if the attempt carries no light for certain.
   std::optional<Sample> sample(Rng& rng) const;

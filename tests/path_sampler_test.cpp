@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Laws of path sampling: the density that log_density says is the one that sample draws from.
+#include "driftlight/path_sampler.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "driftlight/contribution.h"
+#include "driftlight/render.h"
+#include "driftlight/running_mean.h"
+#include "support/t_test.h"
+#include "support/test_scenes.h"
+
+namespace driftlight::test {
+namespace {
+
+/// Length and end of a path in words.
+std::string kind(const PathTopology& topology) {
+  static const std::array<std::string, 4> ends{"hit", "environment", "area connection",
+                                               "point connection"};
+  return std::to_string(topology.length()) + " edges, " +
+         ends[static_cast<std::size_t>(topology.end)] + " of emitter " +
+         std::to_string(topology.emitter);
+}
+
+/// A sampler whose table prefers one strategy nine times out of ten.
+PathSampler biased_sampler(const TestScene& test, EndStrategy favourite) {
+  PathSampler sampler(test.scene, test.max_depth);
+  std::vector<RunningMean> weights(static_cast<std::size_t>(sampler.entry_count()));
+  weights[0].add(1.0);
+  // Entries: length 1 by hit only, then (2, hit), (2, connect), (3, hit), ..
+  for (std::size_t i = 1; i < weights.size(); ++i)
+    if ((i % 2 == 0) == (favourite == EndStrategy::Connect)) weights[i].add(1.0);
+  sampler.learn(weights);
+  return sampler;
+}
+
+/// Calls visit(sample) or visit(nothing) for `count` attempts.
+template <class Visit>
+void draw(const PathSampler& sampler, std::uint64_t seed, int count, const Visit& visit) {
+  for (int i = 0; i < count; ++i) {
+    Rng rng(seed, Stream::Test, static_cast<std::uint64_t>(i));
+    visit(sampler.sample(rng));
+  }
+}
+
+double log_target(const TestScene& test, const PathSampler::Sample& path) {
+  return contribution(test.scene, path.topology, path.coordinates).log_target;
+}
+
+// Law: in a closed diffuse sphere of albedo rho that emits L = 1, E[f / q] = sum rho^k over the
+// allowed lengths, and each length n has its own rho^(n - 1).
+TEST(PathSampler, ClosedFurnace) {
+  const double albedo = 0.6;
+  const Scene scene = furnace(albedo);
+  const int max_depth = 6;
+  const PathSampler sampler(scene, max_depth);
+  Moments total;
+  std::array<Moments, 7> by_length;
+  draw(sampler, 101, 30000, [&](const std::optional<PathSampler::Sample>& path) {
+    double weight = 0;
+    int length = 0;
+    if (path) {
+      length = path->topology.length();
+      weight = std::exp(contribution(scene, path->topology, path->coordinates).log_target -
+                        sampler.log_density(path->topology, path->coordinates));
+    }
+    total.add(weight);
+    for (int n = 1; n <= max_depth; ++n)
+      by_length[static_cast<std::size_t>(n)].add(n == length ? weight : 0.0);
+  });
+  const double significance = sidak(0.01, max_depth + 1);
+  const double expected = (1.0 - std::pow(albedo, max_depth)) / (1.0 - albedo);
+  EXPECT_GT(student_p_value(total, expected), significance) << total.mean() << " " << expected;
+  EXPECT_LT(total.error(), 0.02 * expected);
+  for (int n = 1; n <= max_depth; ++n)
+    EXPECT_GT(student_p_value(by_length[static_cast<std::size_t>(n)], std::pow(albedo, n - 1)),
+              significance)
+        << n;
+}
+
+// Law: q is a density. Drawn with one table and weighted with q' / q, each kind of path comes as
+// often as it does when it is drawn with the other table: for every length, end and emitter, whether
+// a strategy hits or connects. The weights are bounded, so the means are normal.
+TEST(PathSampler, DensitiesOfDifferentTablesAgree) {
+  const int count = 60000;
+  int kinds = 0;
+  std::vector<double> p_values;
+  for (const TestScene& test : test_scenes()) {
+    const PathSampler hitting = biased_sampler(test, EndStrategy::Hit);
+    const PathSampler connecting = biased_sampler(test, EndStrategy::Connect);
+    // Frequencies under `hitting`, found with both samplers.
+    std::map<std::string, double> plain;
+    std::map<std::string, std::array<double, 2>> weighted;
+    draw(hitting, 102, count, [&](const std::optional<PathSampler::Sample>& path) {
+      if (path && std::isfinite(log_target(test, *path))) plain[kind(path->topology)] += 1.0;
+    });
+    draw(connecting, 103, count, [&](const std::optional<PathSampler::Sample>& path) {
+      if (!path || !std::isfinite(log_target(test, *path))) return;
+      const double ratio =
+          std::exp(hitting.log_density(path->topology, path->coordinates) -
+                   connecting.log_density(path->topology, path->coordinates));
+      EXPECT_LT(ratio, 20.0);
+      auto& sums = weighted[kind(path->topology)];
+      sums[0] += ratio;
+      sums[1] += ratio * ratio;
+    });
+    for (const auto& [name, sums] : weighted) {
+      const double hits = plain[name];
+      if (hits < 30) continue;
+      ++kinds;
+      const double variance = hits + sums[1];
+      const double p = normal_p_value((hits - sums[0]) / std::sqrt(variance));
+      p_values.push_back(p);
+      EXPECT_GT(p, 1e-5) << test.name << ": " << name << ": " << hits << " against " << sums[0]
+                         << " +- " << std::sqrt(variance);
+    }
+    for (const auto& [name, hits] : plain)
+      EXPECT_TRUE(hits < 30 || weighted.contains(name)) << test.name << ": " << name;
+  }
+  EXPECT_GT(kinds, 50);
+  const double significance = sidak(0.01, kinds);
+  for (const double p : p_values) EXPECT_GT(p, significance);
+}
+
+/// E[f / q], in batches so that the tail of single weights does not spoil the test.
+Moments mean_weight(const TestScene& test, const PathSampler& sampler, std::uint64_t seed,
+                    int count) {
+  Moments batches;
+  double sum = 0;
+  int in_batch = 0;
+  draw(sampler, seed, count, [&](const std::optional<PathSampler::Sample>& path) {
+    if (path) {
+      const double weight = std::exp(log_target(test, *path) -
+                                     sampler.log_density(path->topology, path->coordinates));
+      if (std::isfinite(weight)) sum += weight;
+    }
+    if (++in_batch < 1000) return;
+    batches.add(sum / in_batch);
+    sum = 0;
+    in_batch = 0;
+  });
+  return batches;
+}
+
+// Law: E[f / q] is the mean luminance of the image, whatever the table: two tables agree with each
+// other and with the path tracer, which knows neither f nor q.
+TEST(PathSampler, MeanWeightIsTheMeanOfTheImage) {
+  const int tests = 2 * static_cast<int>(test_scenes().size());
+  const double significance = sidak(0.01, tests);
+  for (const TestScene& test : test_scenes()) {
+    const Moments hitting =
+        mean_weight(test, biased_sampler(test, EndStrategy::Hit), 104, 100000);
+    const Moments connecting =
+        mean_weight(test, biased_sampler(test, EndStrategy::Connect), 105, 100000);
+    EXPECT_GT(welch_p_value(hitting, connecting), significance)
+        << test.name << ": " << hitting.mean() << " +- " << hitting.error() << " and "
+        << connecting.mean() << " +- " << connecting.error();
+    Moments traced;
+    for (std::uint64_t seed = 0; seed < 24; ++seed) {
+      RenderOptions render;
+      render.threads = 1;
+      render.seed = seed;
+      const PathResult result = render_path(test.scene, {.max_depth = test.max_depth}, render, 16);
+      EXPECT_EQ(result.non_finite, 0U);
+      double sum = 0;
+      for (std::size_t i = 0; i < result.image.rgb.size(); i += 3)
+        for (std::size_t c = 0; c < 3; ++c)
+          sum += kLuminance[static_cast<Eigen::Index>(c)] *
+                 static_cast<double>(result.image.rgb[i + c]);
+      traced.add(3.0 * sum / static_cast<double>(result.image.rgb.size()));
+    }
+    const Moments& better = hitting.error() < connecting.error() ? hitting : connecting;
+    EXPECT_GT(welch_p_value(better, traced), significance)
+        << test.name << ": " << better.mean() << " +- " << better.error() << " and "
+        << traced.mean() << " +- " << traced.error();
+  }
+}
+
+// Law: a path longer than max_depth cannot be sampled.
+TEST(PathSampler, NothingBeyondMaxDepth) {
+  const TestScene& test = test_scenes().front();
+  const PathSampler shallow(test.scene, 3);
+  for (const PathSampler::Sample& path : light_paths(test, 500, 106)) {
+    const double log_q = shallow.log_density(path.topology, path.coordinates);
+    EXPECT_EQ(std::isfinite(log_q), path.topology.length() <= 3);
+  }
+}
+
+// Law: the same stream draws the same path, bit for bit.
+TEST(PathSampler, Reproducible) {
+  for (const TestScene& test : test_scenes()) {
+    const auto once = light_paths(test, 100, 107);
+    const auto again = light_paths(test, 100, 107);
+    for (std::size_t i = 0; i < once.size(); ++i) {
+      EXPECT_EQ(once[i].topology.block_count, again[i].topology.block_count);
+      for (int k = 0; k < once[i].topology.block_count; ++k)
+        EXPECT_EQ(once[i].coordinates(k), again[i].coordinates(k));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace driftlight::test
