@@ -178,7 +178,7 @@ void for_each_pass(int d, const Pass& pass) {
   } else if (d <= 8) {
     pass(std::integral_constant<int, 8>{}, 0);
   } else {
-    for (int first = 0; first < d; first += 16) pass(std::integral_constant<int, 16>{}, first);
+    for (int first = 0; first < d; first += 8) pass(std::integral_constant<int, 8>{}, first);
   }
 }
 
@@ -226,8 +226,8 @@ Vector divergence(const Scene& scene, const PathTopology& topology, const Chart&
   const Matrix l_inverse = cholesky.matrixL().solve(Matrix::Identity(d, d));
   for (int j = 0; j < d; ++j) {
     // A small part of the width that the constraints leave to this coordinate while the others are
-    // held, 1 / (3 sqrt(Q_jj)): far above rounding, far below curvature. The width sqrt(Q^-1_jj) / 3
-    // of free others can be a hundred times that, and a step of it leaves the valley.
+    // held, 1 / (3 sqrt(Q_jj)): far above rounding, far below curvature. With the others free it is
+    // sqrt(Q^-1_jj) / 3, which can be a hundred times wider: such a step leaves the valley.
     const double q_jj = l_inverse.col(j).squaredNorm();
     const double h = 1e-4 * std::min(1.0, 1.0 / (3.0 * std::sqrt(q_jj)));
     delta[j] = h;

@@ -240,8 +240,7 @@ TEST(Bsdf, EvalOverPdfInClosedForm) {
       const auto next = sample(metal, kPoint, wi, rng.uniform3());
       if (!next) continue;
       const double cos_ih = wi.dot((wi + next->wo).normalized());
-      const double expected =
-          fresnel_conductor(cos_ih, 0.2, 3.0) * ggx.g1(kPoint.n.dot(next->wo));
+      const double expected = fresnel_conductor(cos_ih, 0.2, 3.0) * ggx.g1(kPoint.n.dot(next->wo));
       EXPECT_NEAR(eval_luminance(metal, wi, next->wo) / pdf(metal, kPoint, wi, next->wo), expected,
                   1e-7 * expected);
     }
@@ -281,8 +280,9 @@ TEST(Bsdf, DeltaDirections) {
     const double p = delta_probability(glass, kPoint, wi, Scattering::Transmission);
     EXPECT_NEAR(transmitted, count * p, 4.5 * std::sqrt(count * p * (1.0 - p)) + 1e-9);
     if (kPoint.n.dot(wi) <= 0.0) continue;
-    EXPECT_LT((delta_direction(mirror, kPoint, wi, Scattering::Reflection) -
-               reflect(wi, kPoint.n)).norm(), 1e-15);
+    EXPECT_LT((delta_direction(mirror, kPoint, wi, Scattering::Reflection) - reflect(wi, kPoint.n))
+                  .norm(),
+              1e-15);
     EXPECT_EQ(delta_probability(mirror, kPoint, wi, Scattering::Reflection), 1.0);
   }
 }

@@ -14,8 +14,8 @@
 namespace driftlight::test {
 namespace {
 
-const Vec3d kPoint{0.5, 0.3, -4.0};        // on the surface, seen from the origin
-const Vec3d kLightPoint{0.4, 0.2, 3.0};    // on the lamp behind the camera
+const Vec3d kPoint{0.5, 0.3, -4.0};      // on the surface, seen from the origin
+const Vec3d kLightPoint{0.4, 0.2, 3.0};  // on the lamp behind the camera
 const Vec3d kNormal{0, 0, 1};
 const Vec3d kBulb{-1.0, 1.5, -1.0};
 const Rgbd kLampRadiance{3, 2, 1};
@@ -23,8 +23,8 @@ const Rgbd kBulbIntensity{5, 6, 7};
 const Rgbd kBackRadiance{1, 4, 2};
 const Rgbd kSky{0.5, 0.7, 0.9};
 
-/// A plane z = -4 that faces the camera at the origin, a lamp at z = 3 and a bulb before it, another
-/// lamp at z = -8 behind it, and a constant sky around.
+/// A plane z = -4 that faces the camera at the origin, a lamp at z = 3 and a bulb before it,
+/// another lamp at z = -8 behind it, and a constant sky around.
 class OneBounce {
  public:
   static constexpr std::uint32_t kLamp = 0;
@@ -156,8 +156,8 @@ TEST(Contribution, RoughMetalUnderTheSky) {
 TEST(Contribution, RoughTransmission) {
   const double alpha = 0.4;
   const double eta = 1.3;
-  const OneBounce bounce(RoughDielectric{{Distribution::Ggx, alpha}, eta, Texture(Rgbd::Ones()),
-                                         Texture(Rgbd::Ones())});
+  const OneBounce bounce(RoughDielectric{
+      {Distribution::Ggx, alpha}, eta, Texture(Rgbd::Ones()), Texture(Rgbd::Ones())});
   const Vec3d wo = Vec3d(-0.2, 0.1, -1.0).normalized();
   // Toward the side of the lower index.
   const Vec3d h = -(kWi + eta * wo).normalized();
@@ -202,9 +202,7 @@ TEST(Contribution, SumOfLogarithmsEqualsTheProduct) {
     void sensor(const PerspectiveCamera& camera, const Vec3d& v) {
       f *= 1.0 / (camera.area() * std::pow(camera.forward.dot(v), 3));
     }
-    void scatter(const ScatterEvent<double>& e) {
-      multiply(eval(e.bsdf, e.surface(), e.wi, e.wo));
-    }
+    void scatter(const ScatterEvent<double>& e) { multiply(eval(e.bsdf, e.surface(), e.wi, e.wo)); }
     void connect(const ScatterEvent<double>& e) { scatter(e); }
     void delta(const ScatterEvent<double>& e) {
       multiply(eval_delta(e.bsdf, e.surface(), e.wi, e.scattering));

@@ -78,8 +78,8 @@ TEST(FresnelConductor, WithoutAbsorptionEqualsDielectric) {
 TEST(FresnelConductor, NormalIncidence) {
   for (const double eta : {0.0, 0.143, 1.0, 2.7})
     for (const double k : {0.3, 2.0, 4.0}) {
-      const double expected = ((eta - 1.0) * (eta - 1.0) + k * k) /
-                              ((eta + 1.0) * (eta + 1.0) + k * k);
+      const double expected =
+          ((eta - 1.0) * (eta - 1.0) + k * k) / ((eta + 1.0) * (eta + 1.0) + k * k);
       EXPECT_NEAR(fresnel_conductor(1.0, eta, k), expected, 1e-14);
     }
 }

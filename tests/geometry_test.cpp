@@ -73,15 +73,14 @@ TEST(Interaction, Triangle) {
   }
 }
 
-// Law: both roots of the sphere lie on it and on the ray, the first where the ray enters; the normal
-// is radial, flipped if asked; uv are the angles in the sphere's own frame.
+// Law: both roots of the sphere lie on it and on the ray, the first where the ray enters; the
+// normal is radial, flipped if asked; uv are the angles in the sphere's own frame.
 TEST(Interaction, Sphere) {
   Rng rng(122, Stream::Test, 0);
   Sphere sphere;
   sphere.center = {1, -2, 0.5};
   sphere.radius = 0.7;
-  sphere.to_local =
-      Eigen::AngleAxisd(0.8, Vec3d(1, 2, 3).normalized()).toRotationMatrix();
+  sphere.to_local = Eigen::AngleAxisd(0.8, Vec3d(1, 2, 3).normalized()).toRotationMatrix();
   for (const bool flip : {false, true}) {
     sphere.flip_normals = flip;
     for (int i = 0; i < 500; ++i) {

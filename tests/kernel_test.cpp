@@ -59,8 +59,7 @@ struct DirectStep {
     dt = 1.0 / 3.0;
     if (options.drift != Drift::None) {
       a = -tt * state.gradient;
-      if (options.drift == Drift::Full)
-        a += scale * scale * kC * kC * state.divergence_of_inverse;
+      if (options.drift == Drift::Full) a += scale * scale * kC * kC * state.divergence_of_inverse;
       const double a2 = a.squaredNorm();
       dt = std::min(dt, 2.0 * (t.transpose() * a).squaredNorm() / (a2 * a2));
       dt = std::min(dt, options.epsilon / std::abs(a.dot(state.gradient)));
@@ -166,8 +165,7 @@ TEST(StepDistribution, IdentityIsANinthOfTheUnitMatrix) {
     LocalState state = random_state(4, 3.0, rng);
     state.q = Matrix::Identity(4, 4) / 9.0;
     const StepDistribution matrix = step_of(options, state);
-    const StepDistribution identity(options, 4,
-                                    drift == Drift::None ? nullptr : &state.gradient);
+    const StepDistribution identity(options, 4, drift == Drift::None ? nullptr : &state.gradient);
     const Vector delta = random_state(4, 0.3, rng).gradient;
     for (const double scale : {0.2, 2.0}) {
       EXPECT_NEAR(identity.time_step(scale), matrix.time_step(scale), 1e-14);

@@ -35,8 +35,7 @@ double hemisphere(const std::function<double(const Vec3d&)>& f) {
   const auto integrand = [&](double x, double phi) {
     const double theta = 0.5 * kPi * x * x;
     const double sine = std::sin(theta);
-    return kPi * x * sine *
-           f({sine * std::cos(phi), sine * std::sin(phi), std::cos(theta)});
+    return kPi * x * sine * f({sine * std::cos(phi), sine * std::sin(phi), std::cos(theta)});
   };
   return 2.0 * integrate(integrand, 0.0, 1.0, 0.0, kPi, 1e-7, 9);
 }
@@ -76,7 +75,8 @@ TEST(Microfacets, SampleFollowsPdf) {
       const auto draw = [&] { return m.sample(wi, rng.uniform(), rng.uniform()); };
       const auto pdf = [&](const Vec3d& h) { return m.pdf(cosine, h.z(), wi.dot(h)); };
       const ChiSquareResult result = chi_square_directions(grid, 8000, draw, pdf);
-      EXPECT_GT(result.p_value, significance) << name(m) << " cos " << cosine << " chi^2 " << result.statistic << " of " << result.degrees;
+      EXPECT_GT(result.p_value, significance) << name(m) << " cos " << cosine << " chi^2 "
+                                              << result.statistic << " of " << result.degrees;
     }
   }
 }

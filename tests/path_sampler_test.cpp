@@ -85,8 +85,8 @@ TEST(PathSampler, ClosedFurnace) {
 }
 
 // Law: q is a density. Drawn with one table and weighted with q' / q, each kind of path comes as
-// often as it does when it is drawn with the other table: for every length, end and emitter, whether
-// a strategy hits or connects. The weights are bounded, so the means are normal.
+// often as it does when it is drawn with the other table: for every length, end and emitter,
+// whether a strategy hits or connects. The weights are bounded, so the means are normal.
 TEST(PathSampler, DensitiesOfDifferentTablesAgree) {
   const int count = 60000;
   int kinds = 0;
@@ -102,9 +102,8 @@ TEST(PathSampler, DensitiesOfDifferentTablesAgree) {
     });
     draw(connecting, 103, count, [&](const std::optional<PathSampler::Sample>& path) {
       if (!path || !std::isfinite(log_target(test, *path))) return;
-      const double ratio =
-          std::exp(hitting.log_density(path->topology, path->coordinates) -
-                   connecting.log_density(path->topology, path->coordinates));
+      const double ratio = std::exp(hitting.log_density(path->topology, path->coordinates) -
+                                    connecting.log_density(path->topology, path->coordinates));
       EXPECT_LT(ratio, 20.0);
       auto& sums = weighted[kind(path->topology)];
       sums[0] += ratio;
@@ -154,8 +153,7 @@ TEST(PathSampler, MeanWeightIsTheMeanOfTheImage) {
   const int tests = 2 * static_cast<int>(test_scenes().size());
   const double significance = sidak(0.01, tests);
   for (const TestScene& test : test_scenes()) {
-    const Moments hitting =
-        mean_weight(test, biased_sampler(test, EndStrategy::Hit), 104, 100000);
+    const Moments hitting = mean_weight(test, biased_sampler(test, EndStrategy::Hit), 104, 100000);
     const Moments connecting =
         mean_weight(test, biased_sampler(test, EndStrategy::Connect), 105, 100000);
     EXPECT_GT(welch_p_value(hitting, connecting), significance)

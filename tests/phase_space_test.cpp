@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Laws of the phase space of directions: charts are invertible with the right Jacobian, and tracing
-/// gives back the paths that were sampled.
+/// Laws of the phase space of directions: charts are invertible with the right Jacobian, and
+/// tracing gives back the paths that were sampled.
 #include "driftlight/phase_space.h"
 
 #include <gtest/gtest.h>
@@ -114,8 +114,8 @@ std::array<Vec3d, 2> tangents_at(const Chart::Block& block, const Vec3d& p) {
   return {basis.t, basis.b};
 }
 
-// Law: log_jacobian is log |det d delta / d X| of the map inverse(), X in solid angle for directions
-// and area for emitter points, by central differences.
+// Law: log_jacobian is log |det d delta / d X| of the map inverse(), X in solid angle for
+// directions and area for emitter points, by central differences.
 TEST(Chart, LogJacobianIsTheDeterminant) {
   Rng rng(83, Stream::Test, 0);
   BlocksSeen seen;
@@ -136,9 +136,9 @@ TEST(Chart, LogJacobianIsTheDeterminant) {
           plus(k) += h * tangents[static_cast<std::size_t>(j)];
           minus(k) -= h * tangents[static_cast<std::size_t>(j)];
           // A tangential step leaves the sphere by h^2 only, alike for both.
-          jacobian.col(j) = (chart.inverse(plus)->delta - chart.inverse(minus)->delta)
-                                .segment<2>(2 * k) /
-                            (2.0 * h);
+          jacobian.col(j) =
+              (chart.inverse(plus)->delta - chart.inverse(minus)->delta).segment<2>(2 * k) /
+              (2.0 * h);
         }
         log_determinant += std::log(std::abs(jacobian.determinant()));
       }
@@ -173,8 +173,7 @@ TEST(Trace, ReproducesSampledPaths) {
   for (const TestScene& test : test_scenes()) {
     for (const Path& path : light_paths(test, 3000, 85)) {
       PathTopology traced;
-      const TraceStatus status =
-          trace(test.scene, path.topology, path.coordinates, traced);
+      const TraceStatus status = trace(test.scene, path.topology, path.coordinates, traced);
       EXPECT_EQ(status, TraceStatus::Ok) << test.name;
       if (status != TraceStatus::Ok) continue;
       EXPECT_TRUE(same(traced, path.topology)) << test.name;

@@ -65,8 +65,8 @@ TEST(Scene, ClosedMeshesAreWatertight) {
       const Vec3d b = mesh.positions[triangle[1]].cast<double>();
       const double s = i % 3 == 0 ? 0.0 : rng.uniform();
       const Vec3d origin = 0.3 * random_direction(rng);
-      const Vec3d target = i % 3 == 2 ? Vec3d(origin + random_direction(rng))
-                                      : Vec3d(a + s * (b - a));
+      const Vec3d target =
+          i % 3 == 2 ? Vec3d(origin + random_direction(rng)) : Vec3d(a + s * (b - a));
       EXPECT_TRUE(scene.intersect(origin, (target - origin).normalized()).valid());
     }
   }
@@ -80,8 +80,7 @@ std::vector<Geometry> shapes_at(double magnitude, Rng& rng) {
   sphere.radius = magnitude;
   const Vec3d u = magnitude * random_direction(rng);
   const Vec3d v = magnitude * u.cross(random_direction(rng)).normalized();
-  return {sphere, Disk{center, u, v}, quad(center, u, v),
-          round_mesh(center, magnitude, 16, false)};
+  return {sphere, Disk{center, u, v}, quad(center, u, v), round_mesh(center, magnitude, 16, false)};
 }
 
 // Law: a ray that starts at leave() does not find the surface that it leaves: not at all on the
@@ -108,8 +107,7 @@ TEST(Scene, LeaveKeepsRaysOffTheirOwnSurface) {
         const double cosine = side * std::pow(10.0, -7.0 * rng.uniform());
         const double phi = 2.0 * kPi * rng.uniform();
         const double sine = std::sqrt(1.0 - cosine * cosine);
-        const Vec3d wo =
-            to_world({sine * std::cos(phi), sine * std::sin(phi), cosine}, at.n_g);
+        const Vec3d wo = to_world({sine * std::cos(phi), sine * std::sin(phi), cosine}, at.n_g);
         const Vec3d start = scene.leave(at.p, at.n_g, wo);
         EXPECT_FALSE(scene.intersect(start, wo).valid())
             << "magnitude " << magnitude << " cosine " << cosine;
@@ -183,8 +181,9 @@ TEST(EmitterSampling, UniformByArea) {
   for (const auto* numbers : {&first, &second, &radius, &turn})
     EXPECT_GT(chi_square_uniform(*numbers).p_value, significance);
   const SphereGrid grid(Vec3d::UnitY(), 12, 12, 1.0);
-  EXPECT_GT(chi_square_directions(grid, count, [&] { return sampled(sphere).n; },
-                                  [](const Vec3d&) { return 0.25 * kInvPi; })
+  EXPECT_GT(chi_square_directions(
+                grid, count, [&] { return sampled(sphere).n; },
+                [](const Vec3d&) { return 0.25 * kInvPi; })
                 .p_value,
             significance);
   EXPECT_NEAR(rectangle.shapes()[0].extent.area, u.cross(v).norm(), 1e-5);
@@ -200,8 +199,8 @@ TEST(EmitterSampling, TrianglesByArea) {
   std::vector<double> counts(6);
   const int count = 20000;
   for (int i = 0; i < count; ++i) {
-    const EmitterPoint y = scene.sample_area(std::get<AreaEmitter>(scene.emitters()[0]),
-                                             rng.uniform(), rng.uniform());
+    const EmitterPoint y =
+        scene.sample_area(std::get<AreaEmitter>(scene.emitters()[0]), rng.uniform(), rng.uniform());
     Eigen::Index axis = 0;
     y.n.cwiseAbs().maxCoeff(&axis);
     counts[static_cast<std::size_t>(2 * axis + (y.n[axis] > 0.0 ? 1 : 0))] += 1.0;
@@ -229,17 +228,17 @@ TEST(ShapeExtent, WhitensTheCovariance) {
     Vec3d mean = Vec3d::Zero();
     double square = 0;
     for (int i = 0; i < count; ++i) {
-      const Vec3d p = scene.sample_area(std::get<AreaEmitter>(scene.emitters()[0]), rng.uniform(),
-                                        rng.uniform())
-                          .p;
+      const Vec3d p =
+          scene
+              .sample_area(std::get<AreaEmitter>(scene.emitters()[0]), rng.uniform(), rng.uniform())
+              .p;
       const Vec3d w = extent.whitening * (p - extent.centroid);
       covariance += w * w.transpose() / count;
       mean += w / count;
       square += (p - extent.centroid).squaredNorm() / count;
     }
     const int rank = extent.planar ? 2 : 3;
-    EXPECT_EQ(extent.planar, !std::holds_alternative<Sphere>(shape) &&
-                                 &shape != &shapes.back());
+    EXPECT_EQ(extent.planar, !std::holds_alternative<Sphere>(shape) && &shape != &shapes.back());
     EXPECT_NEAR(covariance.trace(), rank, 0.06);
     EXPECT_NEAR((covariance * covariance).trace(), rank, 0.12);
     EXPECT_LT(mean.norm(), 0.05);

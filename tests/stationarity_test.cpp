@@ -87,8 +87,8 @@ class GaussianTarget {
     std::vector<Observable> result;
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j <= i; ++j)
-        result.push_back({"x_i x_j", [i, j](const Point& x) { return x[i] * x[j]; },
-                          covariance_(i, j)});
+        result.push_back(
+            {"x_i x_j", [i, j](const Point& x) { return x[i] * x[j]; }, covariance_(i, j)});
     // E[exp(i c.x)] = exp(-c.S c / 2)
     const Vector c = wave_;
     const double decay = std::exp(-0.5 * c.dot(covariance_ * c));
@@ -105,8 +105,8 @@ class GaussianTarget {
 // ---- A product of spheres ---------------------------------------------------------------------
 
 /// Two directions with the von Mises-Fisher densities exp(k m.v) and a Q that couples them and
-/// changes from place to place: 1/9 w(X) (S J)^T (S J) + floor, J = dX / d delta, S a constant 6 x 6
-/// matrix, w(X) = exp(a.v_0 + b.v_1). Its divergence is taken by differences in the chart.
+/// changes from place to place: 1/9 w(X) (S J)^T (S J) + floor, J = dX / d delta, S a constant 6 x
+/// 6 matrix, w(X) = exp(a.v_0 + b.v_1). Its divergence is taken by differences in the chart.
 class SphereTarget {
  public:
   using Point = PathCoordinates;
@@ -156,8 +156,7 @@ class SphereTarget {
       gradient[2 * k + 1] = -force.dot(chart.block(k).b);
     }
     const Vector div = options.drift == Drift::Full ? divergence(chart) : Vector::Zero(4);
-    return {x, log_target, chart,
-            step_of(options, matrix(chart, Vector::Zero(4)), gradient, div)};
+    return {x, log_target, chart, step_of(options, matrix(chart, Vector::Zero(4)), gradient, div)};
   }
 
   struct Observable {
@@ -309,13 +308,13 @@ TEST(Stationarity, ProductOfSpheres) {
 // Law: those tests have teeth. A chain whose reverse density is the forward one fails them.
 TEST(Stationarity, WrongReverseDensityFails) {
   for (const Drift drift : kDrifts) {
-    EXPECT_LT(smallest_p_value(GaussianTarget(), options_of(drift, 0.7, 1.0), Reverse::Wrong, 64,
-                               3000),
-              1e-8)
+    EXPECT_LT(
+        smallest_p_value(GaussianTarget(), options_of(drift, 0.7, 1.0), Reverse::Wrong, 64, 3000),
+        1e-8)
         << name(drift);
-    EXPECT_LT(smallest_p_value(SphereTarget(), options_of(drift, 1.5, 1.0), Reverse::Wrong, 48,
-                               600),
-              1e-8)
+    EXPECT_LT(
+        smallest_p_value(SphereTarget(), options_of(drift, 1.5, 1.0), Reverse::Wrong, 48, 600),
+        1e-8)
         << name(drift);
   }
 }

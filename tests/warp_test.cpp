@@ -98,7 +98,7 @@ TEST(DiscreteDistribution, SamplesByWeight) {
 // Law: the ends of [0, 1) fall on indices of positive probability.
 TEST(DiscreteDistribution, EdgesOfTheUnitInterval) {
   const DiscreteDistribution distribution(std::vector<double>{0.0, 1.0, 2.0, 0.0});
-  for (const double start : {0.0, 1e-300, 1.0 / 3.0, 1.0 - 0x1p-53, 1.0}) {
+  for (const double start : {0.0, 1e-300, 1.0 / 3.0, 1.0 - 0x1p-53}) {
     double u = start;
     const int index = distribution.sample(u);
     EXPECT_GT(distribution.probability(index), 0.0) << start;
@@ -112,8 +112,7 @@ TEST(DiscreteDistribution, EdgesOfTheUnitInterval) {
 TEST(TangentBasis, OrthonormalAndRightHanded) {
   Rng rng(116, Stream::Test, 0);
   std::vector<Vec3d> normals{{0, 0, 1}, {0, 0, -1}, {1, 0, 0}, {0, -1, 0}, {1e-9, 0, -1}};
-  for (int i = 0; i < 1000; ++i)
-    normals.push_back(square_to_sphere(rng.uniform(), rng.uniform()));
+  for (int i = 0; i < 1000; ++i) normals.push_back(square_to_sphere(rng.uniform(), rng.uniform()));
   for (const Vec3d& n : normals) {
     const TangentBasis basis = tangent_basis(n);
     EXPECT_NEAR(basis.t.norm(), 1.0, 1e-12);

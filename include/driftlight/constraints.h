@@ -57,8 +57,8 @@ class ConstraintVisitor : public WalkVisitor<T> {
     for (int i = 0; i < 3; ++i) sink_.add(residual[i], precision);
   }
 
-  /// Slopes of the half vector as a vector of the tangent plane, r = h / (h.n) - n, |r| = tan(h, n):
-  /// free of any choice of tangents. h = wi + e wo need not be normalised.
+  /// Slopes of the half vector as a vector of the tangent plane, r = h / (h.n) - n, |r| = tan(h,
+  /// n): free of any choice of tangents. h = wi + e wo need not be normalised.
   Vec3<T> slopes(const ScatterEvent<T>& e, double eta) const {
     const Vec3<T>& n = e.at.n_s;
     const Vec3<T> h = {e.wi.x() + e.wo.x() * eta, e.wi.y() + e.wo.y() * eta,

@@ -8,9 +8,9 @@
 
 namespace driftlight {
 
-/// Reflectance of a smooth dielectric interface. `cos_i` >= 0 is the cosine on the incident side and
-/// `eta` the index beyond over the index on the incident side. Total internal reflection gives 1
-/// with no derivative: the branch cuts it, as the physics does.
+/// Reflectance of a smooth dielectric interface. `cos_i` >= 0 is the cosine on the incident side
+/// and `eta` the index beyond over the index on the incident side. Total internal reflection gives
+/// 1 with no derivative: the branch cuts it, as the physics does.
 ///   r_par = (eta c_i - c_t) / (eta c_i + c_t),  r_perp = (c_i - eta c_t) / (c_i + eta c_t)
 template <Scalar T>
 T fresnel_dielectric(const T& cos_i, double eta) {

@@ -46,8 +46,7 @@ ChiSquareResult chi_square_uniform(std::span<const double> samples, int cells) {
     const int i = std::clamp(static_cast<int>(std::floor(x * cells)), 0, cells - 1);
     observed[static_cast<std::size_t>(i)] += 1.0;
   }
-  const std::vector<double> expected(observed.size(),
-                                     static_cast<double>(samples.size()) / cells);
+  const std::vector<double> expected(observed.size(), static_cast<double>(samples.size()) / cells);
   return chi_square(observed, expected);
 }
 
@@ -64,8 +63,7 @@ double gauss(const std::function<double(double, double)>& f, double x0, double x
   double sum = 0;
   for (std::size_t i = 0; i < kNodes.size(); ++i)
     for (std::size_t j = 0; j < kNodes.size(); ++j)
-      sum += kWeights[i] * kWeights[j] *
-             f(x0 + kNodes[i] * (x1 - x0), y0 + kNodes[j] * (y1 - y0));
+      sum += kWeights[i] * kWeights[j] * f(x0 + kNodes[i] * (x1 - x0), y0 + kNodes[j] * (y1 - y0));
   return sum * (x1 - x0) * (y1 - y0);
 }
 
@@ -107,8 +105,7 @@ int SphereGrid::cell(const Vec3d& direction) const {
       static_cast<int>(std::floor(rings_ * std::pow(angle * kInvPi, 1.0 / power_))), 0, rings_ - 1);
   double turn = std::atan2(local.y(), local.x()) * 0.5 * kInvPi;
   if (turn < 0.0) turn += 1.0;
-  const int sector =
-      std::clamp(static_cast<int>(std::floor(turn * sectors_)), 0, sectors_ - 1);
+  const int sector = std::clamp(static_cast<int>(std::floor(turn * sectors_)), 0, sectors_ - 1);
   return ring * sectors_ + sector;
 }
 
@@ -145,8 +142,8 @@ ChiSquareResult chi_square_directions(const SphereGrid& grid, int attempts,
   std::vector<double> observed(expected.size());
   for (int i = 0; i < attempts; ++i) {
     const Vec3d d = draw();
-    const std::size_t cell = d.isZero(0.0) ? observed.size() - 1
-                                           : static_cast<std::size_t>(grid.cell(d));
+    const std::size_t cell =
+        d.isZero(0.0) ? observed.size() - 1 : static_cast<std::size_t>(grid.cell(d));
     observed[cell] += 1.0;
   }
   return chi_square(observed, expected);

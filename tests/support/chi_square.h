@@ -12,21 +12,21 @@ namespace driftlight::test {
 
 struct ChiSquareResult {
   double statistic = 0;
-  int degrees = 0;      ///< degrees of freedom after pooling
-  double p_value = 1;   ///< chance of a statistic at least as large under the hypothesis
+  int degrees = 0;     ///< degrees of freedom after pooling
+  double p_value = 1;  ///< chance of a statistic at least as large under the hypothesis
 };
 
-/// Pearson's test of observed counts against expected ones: sum (o - e)^2 / e. Cells are pooled, the
-/// smallest expectations first, until each expects at least `minimum`. Both sum to the same total
-/// (put what is missing in a cell of its own), so that the degrees are the cells less one.
+/// Pearson's test of observed counts against expected ones: sum (o - e)^2 / e. Cells are pooled,
+/// the smallest expectations first, until each expects at least `minimum`. Both sum to the same
+/// total (put what is missing in a cell of its own), so that the degrees are the cells less one.
 ChiSquareResult chi_square(std::span<const double> observed, std::span<const double> expected,
                            double minimum = 8);
 
 /// The test of numbers that should be uniform on [0, 1), in `cells` equal cells.
 ChiSquareResult chi_square_uniform(std::span<const double> samples, int cells = 50);
 
-/// Integral of f over the rectangle [x0, x1] x [y0, y1], by Gauss-Legendre rules on squares that are
-/// halved until the result changes by less than `tolerance`; at most `depth` halvings.
+/// Integral of f over the rectangle [x0, x1] x [y0, y1], by Gauss-Legendre rules on squares that
+/// are halved until the result changes by less than `tolerance`; at most `depth` halvings.
 double integrate(const std::function<double(double, double)>& f, double x0, double x1, double y0,
                  double y1, double tolerance, int depth = 8);
 

@@ -13,9 +13,9 @@ struct Derivative {
   double error = std::numeric_limits<double>::infinity();  ///< estimated, absolute
 };
 
-/// f'(0) by Ridders' method: central differences at h, h / r, h / r^2, .. extrapolated to h = 0 with
-/// Neville's tableau; the entry with the smallest change against its neighbours wins. (C. J. F.
-/// Ridders, "Accurate computation of F'(x) and F'(x) F''(x)", Adv. Eng. Software 4, 1982.)
+/// f'(0) by Ridders' method: central differences at h, h / r, h / r^2, .. extrapolated to h = 0
+/// with Neville's tableau; the entry with the smallest change against its neighbours wins. (C. J.
+/// F. Ridders, "Accurate computation of F'(x) and F'(x) F''(x)", Adv. Eng. Software 4, 1982.)
 template <class F>
 Derivative ridders(const F& f, double h) {
   constexpr int kSize = 8;
@@ -31,8 +31,8 @@ Derivative ridders(const F& f, double h) {
     double factor = kRatio * kRatio;
     for (std::size_t j = 1; j <= i; ++j, factor *= kRatio * kRatio) {
       a[j][i] = (a[j - 1][i] * factor - a[j - 1][i - 1]) / (factor - 1.0);
-      const double error = std::max(std::abs(a[j][i] - a[j - 1][i]),
-                                    std::abs(a[j][i] - a[j - 1][i - 1]));
+      const double error =
+          std::max(std::abs(a[j][i] - a[j - 1][i]), std::abs(a[j][i] - a[j - 1][i - 1]));
       if (error <= best.error) best = {a[j][i], error};
     }
     // Rounding has taken over: smaller steps are worse.

@@ -12,8 +12,8 @@
 
 namespace driftlight::test {
 
-/// The classes of a path: its BSDFs (with kind of scattering), the surfaces that it meets and the way
-/// in which it ends; see required_classes.
+/// The classes of a path: its BSDFs (with kind of scattering), the surfaces that it meets and the
+/// way in which it ends; see required_classes.
 std::set<std::string> classes_of(const Scene& scene, const PathSampler::Sample& path);
 
 /// Every class that the test scenes must produce between them.

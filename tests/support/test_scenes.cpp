@@ -16,7 +16,8 @@ TriangleMesh quad(const Vec3d& corner, const Vec3d& u, const Vec3d& v, bool uvs,
     mesh.positions.push_back((corner + s.x() * u + s.y() * v).cast<float>());
     if (uvs) mesh.uvs.push_back(s.cast<float>());
     if (bend != 0.0) {
-      const Vec3d tilt = (2.0 * s.x() - 1.0) * u.normalized() + (2.0 * s.y() - 1.0) * v.normalized();
+      const Vec3d tilt =
+          (2.0 * s.x() - 1.0) * u.normalized() + (2.0 * s.y() - 1.0) * v.normalized();
       const Vec3d n = u.cross(v).normalized() + bend * tilt;
       mesh.normals.push_back(n.normalized().cast<float>());
     }
@@ -202,7 +203,8 @@ Scene glass() {
   const auto plain = make.one_sided(Diffuse{gray(0.7)});
   add_walls(make, plain, make.one_sided(RoughConductor{beckmann(0.3)}), plain);
   const Texture tint = textured(8, 0.6, 1.0);
-  make->add_shape(sphere_at({-1.0, 0.55, 0.9}, 0.5), make.one_sided(Dielectric{kGlass, tint, tint}));
+  make->add_shape(sphere_at({-1.0, 0.55, 0.9}, 0.5),
+                  make.one_sided(Dielectric{kGlass, tint, tint}));
   const auto frosted = make.one_sided(RoughDielectric{beckmann(0.15), kGlass, tint, gray(1.0)});
   make->add_shape(round_mesh({0.0, 0.6, 1.0}, 0.5, 8), frosted);
   const auto etched = make.one_sided(RoughDielectric{ggx(0.15), kGlass, gray(1.0), tint});

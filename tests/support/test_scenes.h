@@ -25,11 +25,11 @@ struct TestScene {
 const std::vector<TestScene>& test_scenes();
 
 /// Paths that carry light, drawn from a scene by its PathSampler.
-std::vector<PathSampler::Sample> light_paths(const TestScene& scene, int count,
-                                             std::uint64_t seed);
+std::vector<PathSampler::Sample> light_paths(const TestScene& scene, int count, std::uint64_t seed);
 
 /// A rectangle of two triangles from `corner` along `u` and `v`, normal along u x v. With `uvs` it
-/// has texture coordinates; `bend` tilts its vertex normals outward by that slope, 0 leaves them out.
+/// has texture coordinates; `bend` tilts its vertex normals outward by that slope, 0 leaves them
+/// out.
 TriangleMesh quad(const Vec3d& corner, const Vec3d& u, const Vec3d& v, bool uvs = false,
                   double bend = 0);
 
