@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -38,6 +39,15 @@ PathSampler biased_sampler(const TestScene& test, EndStrategy favourite) {
     if ((i % 2 == 0) == (favourite == EndStrategy::Connect)) weights[i].add(1.0);
   sampler.learn(weights);
   return sampler;
+}
+
+/// Probability of entry i of that table: the favourites share nine tenths, all share the last one.
+double table_probability(const PathSampler& sampler, int entry, EndStrategy favourite) {
+  const int count = sampler.entry_count();
+  const bool connects = entry > 0 && entry % 2 == 0;
+  const bool favoured = entry == 0 || connects == (favourite == EndStrategy::Connect);
+  const int favourites = 1 + (count - 1) / 2;
+  return (favoured ? 0.9 / favourites : 0.0) + 0.1 / count;
 }
 
 /// Calls visit(sample) or visit(nothing) for `count` attempts.
@@ -125,6 +135,70 @@ TEST(PathSampler, DensitiesOfDifferentTablesAgree) {
   EXPECT_GT(kinds, 50);
   const double significance = sidak(0.01, kinds);
   for (const double p : p_values) EXPECT_GT(p, significance);
+}
+
+/// The chance that a path drawn from the uniform table came by a connection, from densities alone:
+/// with q = c (h + k), h by hitting and k by connecting, and q' = c_h h + c_k k of another table,
+/// k / (h + k) = (q' / q - c_h / c) / (c_k / c - c_h / c).
+double connection_share(const PathSampler& uniform, const PathSampler& other, EndStrategy favourite,
+                        const PathSampler::Sample& path) {
+  const int length = path.topology.length();
+  const double c = 1.0 / uniform.entry_count();
+  const double hit = table_probability(other, 2 * length - 3, favourite) / c;
+  const double connect = table_probability(other, 2 * length - 2, favourite) / c;
+  const double ratio = std::exp(other.log_density(path.topology, path.coordinates) -
+                                uniform.log_density(path.topology, path.coordinates));
+  return (ratio - hit) / (connect - hit);
+}
+
+/// End of a path, and for a hit the kind of shape.
+std::string end_kind(const Scene& scene, const PathTopology& topology) {
+  if (topology.end == PathEnd::PointConnection) return "point";
+  if (topology.end == PathEnd::Environment)
+    return scene.emitters()[topology.emitter].index() == 2 ? "constant sky" : "map";
+  const auto& light = std::get<AreaEmitter>(scene.emitters()[topology.emitter]);
+  const Shape& shape = scene.shapes()[light.shape];
+  return (topology.end == PathEnd::Hit ? "hit of " : "connection to ") +
+         std::string(shape.extent.planar ? "plane" : "solid");
+}
+
+// Law: the density splits rightly between the strategies: each way to end comes from a connection
+// as often as the densities say, and with certainty where only one strategy can find it.
+TEST(PathSampler, StrategiesComeByTheirShare) {
+  struct Tally {
+    double drawn = 0;
+    double expected = 0;
+    double variance = 0;
+  };
+  std::map<std::string, Tally> tallies;
+  for (const TestScene& test : test_scenes()) {
+    const PathSampler uniform(test.scene, test.max_depth);
+    const PathSampler other = biased_sampler(test, EndStrategy::Connect);
+    draw(uniform, 108, 150000, [&](const std::optional<PathSampler::Sample>& path) {
+      if (!path || path->topology.length() == 1) return;
+      if (!std::isfinite(log_target(test, *path))) return;
+      const double share = connection_share(uniform, other, EndStrategy::Connect, *path);
+      EXPECT_GT(share, -1e-9);
+      EXPECT_LT(share, 1.0 + 1e-9);
+      Tally& tally = tallies[end_kind(test.scene, path->topology)];
+      tally.drawn += path->entry % 2 == 0 ? 1.0 : 0.0;
+      tally.expected += share;
+      tally.variance += std::max(0.0, share * (1.0 - share));
+    });
+  }
+  EXPECT_EQ(tallies.size(), 7U);
+  const double significance = sidak(0.01, static_cast<int>(tallies.size()));
+  for (const auto& [name, tally] : tallies) {
+    if (name == "point") {
+      EXPECT_NEAR(tally.drawn, tally.expected, 1e-6 * tally.drawn);
+      continue;
+    }
+    EXPECT_GT(tally.variance, 300.0) << name;
+    const double z = (tally.drawn - tally.expected) / std::sqrt(tally.variance);
+    EXPECT_GT(normal_p_value(z), significance)
+        << name << ": " << tally.drawn << " against " << tally.expected << " +- "
+        << std::sqrt(tally.variance);
+  }
 }
 
 /// E[f / q], in batches so that the tail of single weights does not spoil the test.

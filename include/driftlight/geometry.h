@@ -109,11 +109,11 @@ Interaction<T> interact_shape(const TriangleMesh& mesh, std::uint32_t primitive,
   const T b2 = dot(c2, at.p) - c2.dot(corner[0]);
   if (!mesh.normals.empty()) {
     const Vec3d n0 = mesh.normals[index[0]].cast<double>();
-    const Vec3d n1 = mesh.normals[index[1]].cast<double>() - n0;
-    const Vec3d n2_ = mesh.normals[index[2]].cast<double>() - n0;
-    at.n_s = normalized(Vec3<T>{b1 * n1.x() + b2 * n2_.x() + n0.x(),
-                                b1 * n1.y() + b2 * n2_.y() + n0.y(),
-                                b1 * n1.z() + b2 * n2_.z() + n0.z()});
+    const Vec3d edge1 = mesh.normals[index[1]].cast<double>() - n0;
+    const Vec3d edge2 = mesh.normals[index[2]].cast<double>() - n0;
+    at.n_s = normalized(Vec3<T>{b1 * edge1.x() + b2 * edge2.x() + n0.x(),
+                                b1 * edge1.y() + b2 * edge2.y() + n0.y(),
+                                b1 * edge1.z() + b2 * edge2.z() + n0.z()});
     if (unit.dot(value(at.n_s)) < 0.0) at.n_g = constant<T>(Vec3d(-unit));
   }
   if (want_uv) {
