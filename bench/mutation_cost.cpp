@@ -124,6 +124,7 @@ KernelOptions kernel(PreconditionerKind preconditioner, Drift drift, double scal
   options.preconditioner = preconditioner;
   options.drift = drift;
   options.scale = scale;
+  options.scale_decades = 0;
   return options;
 }
 
@@ -144,7 +145,7 @@ void register_all() {
                                    [=](auto& b) { mutations(b, scene, options); });
     };
     // Step sizes at which about a quarter to a third of the mutations are accepted.
-    const double isotropic = scene == "glossy_chain" ? 0.006 : 0.2;
+    const double isotropic = scene == "glossy_chain" ? 0.006 : 0.04;
     using enum PreconditionerKind;
     whole("identity", kernel(Identity, Drift::None, isotropic));
     whole("identity+gradient", kernel(Identity, Drift::Gradient, isotropic));

@@ -13,6 +13,7 @@
 #include "driftlight/contribution.h"
 #include "driftlight/gradient.h"
 #include "driftlight/kernel.h"
+#include "driftlight/walk.h"
 #include "support/path_classes.h"
 #include "support/test_scenes.h"
 
@@ -213,6 +214,35 @@ TEST(Trace, IsReversible) {
   }
   EXPECT_GT(reached, 1000);
   EXPECT_GT(changed, 100);
+}
+
+/// Counts scattering events that pass light through a surface by its shading normal alone.
+struct LeakCounter : WalkVisitor<double> {
+  int leaks = 0;
+
+  void scatter(const ScatterEvent<double>& e) {
+    if (!passes(e.at, e.wi, e.wo)) ++leaks;
+  }
+  void connect(const ScatterEvent<double>& e) { scatter(e); }
+  void delta(const ScatterEvent<double>& e) { scatter(e); }
+};
+
+// Law: no path, sampled or traced, leaks through interpolated normals: both of its directions lie
+// on one side of the geometric and the shading normal.
+TEST(Trace, LeaksNoLight) {
+  Rng rng(87, Stream::Test, 0);
+  for (const TestScene& test : test_scenes()) {
+    LeakCounter counter;
+    for (const Path& path : light_paths(test, 1500, 87)) {
+      walk<double>(test.scene, path.topology, path.coordinates, counter);
+      const Chart chart(test.scene, path.topology, path.coordinates);
+      const PathCoordinates to = chart.retract(random_delta(chart.dimension(), 0.3, rng));
+      PathTopology topology;
+      if (trace(test.scene, path.topology, to, topology) != TraceStatus::Ok) continue;
+      walk<double>(test.scene, topology, to, counter);
+    }
+    EXPECT_EQ(counter.leaks, 0) << test.name;
+  }
 }
 
 /// A floor, a mirror half over it, a light above and a screen beside it.
