@@ -27,7 +27,8 @@ float from_srgb(float x) {
 /// Linear light -> the nearest of 256 encoded values. NaN becomes 0.
 std::uint8_t to_srgb8(float x) {
   const float y = x <= 0.0031308F ? 12.92F * x : 1.055F * std::pow(x, 1.0F / 2.4F) - 0.055F;
-  return y > 0.0F ? static_cast<std::uint8_t>(std::min(y, 1.0F) * 255.0F + 0.5F) : std::uint8_t{0};
+  return y > 0.0F ? static_cast<std::uint8_t>(std::lround(std::min(y, 1.0F) * 255.0F))
+                  : std::uint8_t{0};
 }
 
 std::string lower_extension(const std::filesystem::path& file) {

@@ -76,6 +76,18 @@ StepDistribution step_of(const KernelOptions& options, const LocalState& state) 
           options.drift == Drift::Full ? &state.divergence_of_inverse : nullptr};
 }
 
+/// Options with the drift, all else as in [E63]; the defaults are free to change.
+KernelOptions options_of(Drift drift) {
+  KernelOptions options;
+  options.drift = drift;
+  options.epsilon = 0.1;
+  options.safety = 1;
+  options.time_step_cap = 1.0 / 3.0;
+  options.scale = 1;
+  options.scale_decades = 0;
+  return options;
+}
+
 const std::vector<Drift> kDrifts{Drift::None, Drift::Gradient, Drift::Full};
 
 // Law: time step, mean and log density are those of the formulas, for the non-symmetric T = c L^-T,
@@ -87,8 +99,7 @@ TEST(StepDistribution, FollowsTheFormulas) {
       for (const double slope : {0.01, 1.0, 100.0}) {
         for (const double scale : {0.1, 1.0, 3.0}) {
           for (const double safety : {1.0, 10.0}) {
-            KernelOptions options;
-            options.drift = drift;
+            KernelOptions options = options_of(drift);
             options.safety = safety;
             options.time_step_cap = rng.uniform() < 0.3 ? 0.01 : 1.0 / 3.0;
             const LocalState state = random_state(dimension, slope, rng);
@@ -119,8 +130,7 @@ TEST(StepDistribution, EveryLimitOfTheTimeStepBinds) {
   int ratio_limit = 0;
   int slope_limit = 0;
   for (int i = 0; i < 300; ++i) {
-    KernelOptions options;
-    options.drift = Drift::Full;
+    KernelOptions options = options_of(Drift::Full);
     options.epsilon = std::pow(10.0, 4.0 * rng.uniform() - 2.0);
     const LocalState state = random_state(4, std::pow(10.0, 4.0 * rng.uniform() - 2.0), rng);
     const DirectStep direct(options, state, 1.0);
@@ -139,8 +149,7 @@ TEST(StepDistribution, EveryLimitOfTheTimeStepBinds) {
 // Law: without drift at dt = 1/3 and scale 1 the covariance is Q^-1 / 9.
 TEST(StepDistribution, BrownianCovarianceIsANinthOfTheInverse) {
   Rng rng(23, Stream::Test, 0);
-  KernelOptions options;
-  options.drift = Drift::None;
+  KernelOptions options = options_of(Drift::None);
   const LocalState state = random_state(3, 1.0, rng);
   const StepDistribution step = step_of(options, state);
   const Dense expected = Dense(state.q).inverse() / 9.0;
@@ -160,8 +169,7 @@ TEST(StepDistribution, BrownianCovarianceIsANinthOfTheInverse) {
 TEST(StepDistribution, IdentityIsANinthOfTheUnitMatrix) {
   Rng rng(24, Stream::Test, 0);
   for (const Drift drift : {Drift::None, Drift::Gradient}) {
-    KernelOptions options;
-    options.drift = drift;
+    KernelOptions options = options_of(drift);
     LocalState state = random_state(4, 3.0, rng);
     state.q = Matrix::Identity(4, 4) / 9.0;
     const StepDistribution matrix = step_of(options, state);
@@ -179,7 +187,7 @@ TEST(StepDistribution, IdentityIsANinthOfTheUnitMatrix) {
 TEST(StepDistribution, FallsBackToTheIdentity) {
   Rng rng(25, Stream::Test, 0);
   LocalState state = random_state(4, 1.0, rng);
-  KernelOptions options;
+  const KernelOptions options = options_of(Drift::Gradient);
   const Vector delta = random_state(4, 0.3, rng).gradient;
   const StepDistribution identity(options, 4, &state.gradient);
   for (const double bad : {-1.0, std::numeric_limits<double>::quiet_NaN()}) {
@@ -200,8 +208,7 @@ TEST(StepDistribution, SampleFollowsItsDensity) {
   for (const Drift drift : kDrifts) {
     for (const int dimension : {2, 5, 12}) {
       for (const double scale : {0.05, 1.0, 4.0}) {
-        KernelOptions options;
-        options.drift = drift;
+        KernelOptions options = options_of(drift);
         const LocalState state = random_state(dimension, 2.0, rng);
         const StepDistribution step = step_of(options, state);
         const DirectStep direct(options, state, scale);
@@ -238,7 +245,7 @@ TEST(InverseOfSpd, InvertsOrRefuses) {
 // Law: log10 of the scale is uniform over the decades about the option, and fixed without them.
 TEST(DrawScale, LogUniform) {
   Rng rng(28, Stream::Test, 0);
-  KernelOptions options;
+  KernelOptions options = options_of(Drift::None);
   options.scale = 0.3;
   EXPECT_EQ(draw_scale(options, rng), 0.3);
   options.scale_decades = 2;
@@ -269,8 +276,7 @@ TEST(StepDistribution, DensityOnTheSphere) {
   const double significance = sidak(0.01, 9);
   for (const Drift drift : kDrifts) {
     for (const double scale : {0.1, 1.0, 3.0}) {
-      KernelOptions options;
-      options.drift = drift;
+      KernelOptions options = options_of(drift);
       LocalState state = random_state(2, 2.0, rng);
       state.q = Matrix{{2.0, 0.7}, {0.7, 0.9}};
       const StepDistribution step = step_of(options, state);
@@ -311,8 +317,7 @@ ChainState turned_state(const Scene& scene, const KernelOptions& options,
 // the choice of tangents.
 TEST(StepDistribution, InvariantUnderRotationsOfTheBases) {
   Rng rng(30, Stream::Test, 0);
-  KernelOptions options;
-  options.drift = Drift::Full;
+  KernelOptions options = options_of(Drift::Full);
   int compared = 0;
   for (const TestScene& test : test_scenes()) {
     for (const PathSampler::Sample& path : light_paths(test, 100, 30)) {

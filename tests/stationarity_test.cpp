@@ -58,7 +58,8 @@ class GaussianTarget {
     factor_ = a;
     covariance_ = a * a.transpose();
     precision_ = Eigen::MatrixXd(covariance_).inverse();
-    wave_ = Eigen::Vector3d(0.9, 0.8, -0.5);
+    wave_ = Vector::Zero(3);
+    wave_ << 0.9, 0.8, -0.5;
   }
 
   /// A point of the target itself, to start from.
@@ -281,6 +282,8 @@ KernelOptions options_of(Drift drift, double scale, double decades) {
   options.scale = scale;
   options.scale_decades = decades;
   options.epsilon = 1.0;
+  options.safety = 1.0;
+  options.time_step_cap = 1.0 / 3.0;
   return options;
 }
 
@@ -367,9 +370,7 @@ TEST(DetailedBalance, AcceptanceOfDegenerateNumbers) {
 /// The stationary mean of cos 2x of the discretised Langevin equation without Hastings, in one
 /// dimension with U = x^2 / 2 and T T* = D(x) = 1 + 0.6 cos 2x, over independent chains.
 Moments unadjusted_mean(Drift drift, double time_step) {
-  KernelOptions options;
-  options.drift = drift;
-  options.scale = 1.0;
+  KernelOptions options = options_of(drift, 1.0, 0.0);
   options.epsilon = 1e9;
   options.time_step_cap = time_step;
   Moments result;
