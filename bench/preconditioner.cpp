@@ -90,8 +90,8 @@ std::vector<Row> rows() {
 }
 
 void run(const std::filesystem::path& file) {
-  constexpr int kRuns = 4;
-  constexpr double kMutationsPerPixel = 100;
+  constexpr int kRuns = 6;
+  constexpr double kMutationsPerPixel = 150;
   LoadOptions load;
   load.defines = {{"width", "128"}, {"height", "96"}};
   const LoadedScene loaded = load_scene(file, load);

@@ -140,10 +140,12 @@ std::optional<PathSampler::Sample> PathSampler::end_by_hit(Sample path, RayFollo
   }
   const Shape& shape = scene_.shapes()[hit.shape];
   if (!shape.emitter) return std::nullopt;
+  const Interaction<double> at = scene_.interact(hit, follower.ray());
+  if (at.n_g.dot(follower.ray().direction) >= 0.0) return std::nullopt;  // the dark side
   topology.emitter = *shape.emitter;
   if (last_bsdf != nullptr && connects_to_area(*last_bsdf, shape)) {
     topology.end = PathEnd::AreaConnection;
-    path.coordinates(topology.block_count - 1) = scene_.interact(hit, follower.ray()).p;
+    path.coordinates(topology.block_count - 1) = at.p;
   } else {
     topology.end = PathEnd::Hit;
     topology.vertices[topology.scatter_count].hit = hit;
