@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// What the parts of a mutation cost, by path length, on glossy_chain and cornell_glossy: trace,
-/// value, gradient, gradient with Q, factorisation, and whole small steps with the identity and with
-/// constraints and drift. Compare rows of one run only: machines are shared and noisy.
+/// value, gradient, gradient with Q, factorisation, and whole small steps with the identity and
+/// with constraints and drift. Compare rows of one run only: machines are shared and noisy.
 #include <benchmark/benchmark.h>
 
 #include <filesystem>

@@ -42,8 +42,8 @@ void measure_jumps(const Scene& scene, const PathSampler& sampler, const Bootstr
       const PathCoordinates before = chain.state().coordinates;
       chain.run(1);
       const ChainState& after = chain.state();
-      const int directions = after.topology.block_count -
-                             (after.topology.end == PathEnd::AreaConnection ? 1 : 0);
+      const int directions =
+          after.topology.block_count - (after.topology.end == PathEnd::AreaConnection ? 1 : 0);
       for (int k = 0; k < directions; ++k)
         row.directions += (after.coordinates(k) - before(k)).squaredNorm();
       row.film += (scene.camera().film_position(after.coordinates(0)) -
@@ -110,8 +110,7 @@ void run(const std::filesystem::path& file) {
     for (int i = 0; i < kRuns; ++i) {
       RenderOptions render;
       render.seed = 100 * r + static_cast<std::uint64_t>(i);
-      images[r].push_back(
-          render_langevin(loaded.scene, options, render, kMutationsPerPixel).image);
+      images[r].push_back(render_langevin(loaded.scene, options, render, kMutationsPerPixel).image);
       const auto weight = 1.0F / static_cast<float>(kRuns * table.size());
       for (std::size_t k = 0; k < mean.rgb.size(); ++k)
         mean.rgb[k] += weight * images[r].back().rgb[k];

@@ -61,8 +61,7 @@ std::optional<BsdfSample> sample_bsdf(const Dielectric& b, const Point& at, cons
   const double cos_i = at.n.dot(wi);
   if (u.z() < reflection_probability(b, cos_i))
     return BsdfSample{reflect(wi, at.n), Scattering::Reflection};
-  return BsdfSample{refract(wi, at.n, cos_i > 0.0 ? b.eta : 1.0 / b.eta),
-                    Scattering::Transmission};
+  return BsdfSample{refract(wi, at.n, cos_i > 0.0 ? b.eta : 1.0 / b.eta), Scattering::Transmission};
 }
 
 double pdf_bsdf(const Dielectric&, const Point&, const Vec3d&, const Vec3d&) { return 0.0; }

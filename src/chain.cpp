@@ -31,8 +31,7 @@ void prepare_step(const Scene& scene, const KernelOptions& options, ChainState& 
   }
   std::optional<Vector> div;
   if (options.drift == Drift::Full && use_gradient)
-    if (const auto inverse = inverse_of_spd(derivatives.q))
-      div = divergence(scene, state.topology, state.chart, *inverse);
+    div = divergence(scene, state.topology, state.chart, derivatives.q);
   state.step = StepDistribution(options, derivatives.q, gradient, div ? &*div : nullptr);
 }
 
@@ -80,8 +79,8 @@ std::optional<double> Chain::propose_large() {
   if (weight == 0.0) return std::nullopt;
   ChainState& from = current();
   if (std::isnan(from.log_weight))
-    from.log_weight = from.contribution.log_target -
-                      sampler_.log_density(from.topology, from.coordinates);
+    from.log_weight =
+        from.contribution.log_target - sampler_.log_density(from.topology, from.coordinates);
   return std::exp(log_acceptance(from.log_weight, to.log_weight, 0.0, 0.0));
 }
 
@@ -110,18 +109,25 @@ std::optional<double> Chain::propose_small() {
     ++statistics_.rejections.non_finite;
     return std::nullopt;
   }
-  return std::exp(log_acceptance(from.contribution.log_target, to.contribution.log_target, forward,
-                                 reverse));
+  return std::exp(
+      log_acceptance(from.contribution.log_target, to.contribution.log_target, forward, reverse));
 }
 
 bool Chain::evaluate_proposed() {
   ChainState& to = proposed();
   Rejections& rejections = statistics_.rejections;
   switch (trace(scene_, current().topology, to.coordinates, to.topology)) {
-    case TraceStatus::Ok: break;
-    case TraceStatus::Missed: ++rejections.missed; return false;
-    case TraceStatus::OtherLobe: ++rejections.other_lobe; return false;
-    case TraceStatus::Occluded: ++rejections.occluded; return false;
+    case TraceStatus::Ok:
+      break;
+    case TraceStatus::Missed:
+      ++rejections.missed;
+      return false;
+    case TraceStatus::OtherLobe:
+      ++rejections.other_lobe;
+      return false;
+    case TraceStatus::Occluded:
+      ++rejections.occluded;
+      return false;
   }
   to.has_step = false;
   to.log_weight = std::numeric_limits<double>::quiet_NaN();

@@ -60,8 +60,7 @@ Vec3d EnvironmentMap::sample(double u1, double u2) const {
 
 double EnvironmentMap::pdf(const Vec3d& d) const {
   const double dy = std::clamp(axis_y_.dot(d), -1.0, 1.0);
-  const double x =
-      std::atan2(axis_x_.dot(d), -axis_z_.dot(d)) * 0.5 * kInvPi * bitmap_.width - 0.5;
+  const double x = std::atan2(axis_x_.dot(d), -axis_z_.dot(d)) * 0.5 * kInvPi * bitmap_.width - 0.5;
   const int row = row_of(std::acos(dy) * kInvPi * bitmap_.height);
   int column = static_cast<int>(std::floor(x)) % bitmap_.width;
   if (column < 0) column += bitmap_.width;

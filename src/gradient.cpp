@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <limits>
 
 #include "driftlight/constraints.h"
 #include "driftlight/contribution.h"
@@ -215,30 +216,30 @@ void constraint_matrix(const Scene& scene, const PathTopology& topology, const C
 }
 
 Vector divergence(const Scene& scene, const PathTopology& topology, const Chart& chart,
-                  const Matrix& q_inverse) {
+                  const Matrix& q) {
   const int d = chart.dimension();
+  const Eigen::LLT<Matrix> cholesky(q);
+  if (cholesky.info() != Eigen::Success)
+    return Vector::Constant(d, std::numeric_limits<double>::quiet_NaN());
+  const Matrix inverse = cholesky.solve(Matrix::Identity(d, d));
   Matrix plus;
   Matrix minus;
   Vector delta = Vector::Zero(d);
   Vector sum = Vector::Zero(d);
-  // Q_jj = |L^-1 e_j|^2 with Q^-1 = L L^T
-  const Eigen::LLT<Matrix> cholesky(q_inverse);
-  const Matrix l_inverse = cholesky.matrixL().solve(Matrix::Identity(d, d));
   for (int j = 0; j < d; ++j) {
     // A small part of the width that the constraints leave to this coordinate while the others are
     // held, 1 / (3 sqrt(Q_jj)): far above rounding, far below curvature. With the others free it is
     // sqrt(Q^-1_jj) / 3, which can be a hundred times wider: such a step leaves the valley.
-    const double q_jj = l_inverse.col(j).squaredNorm();
-    const double h = 1e-4 * std::min(1.0, 1.0 / (3.0 * std::sqrt(q_jj)));
+    const double h = 1e-4 * std::min(1.0, 1.0 / (3.0 * std::sqrt(q(j, j))));
     delta[j] = h;
     constraint_matrix(scene, topology, chart, delta, plus);
     delta[j] = -h;
     constraint_matrix(scene, topology, chart, delta, minus);
     delta[j] = 0.0;
     const Matrix slope = (plus - minus) / (2.0 * h);
-    sum += slope.selfadjointView<Eigen::Lower>() * q_inverse.col(j);
+    sum += slope.selfadjointView<Eigen::Lower>() * inverse.col(j);
   }
-  return -(q_inverse.selfadjointView<Eigen::Lower>() * sum);
+  return -(inverse * sum);
 }
 
 }  // namespace driftlight

@@ -93,15 +93,6 @@ double StepDistribution::log_density(const Vector& delta, double scale) const {
   return log_det_l_ - 0.5 * (quadratic / variance + dimension_ * (kLogTwoPi + std::log(variance)));
 }
 
-std::optional<Matrix> inverse_of_spd(const Matrix& q) {
-  const Eigen::LLT<Matrix> cholesky(q);
-  if (cholesky.info() != Eigen::Success) return std::nullopt;
-  Matrix inverse = Matrix::Identity(q.rows(), q.cols());
-  cholesky.solveInPlace(inverse);
-  if (!inverse.allFinite()) return std::nullopt;
-  return inverse;
-}
-
 double draw_scale(const KernelOptions& options, Rng& rng) {
   if (options.scale_decades <= 0.0) return options.scale;
   return options.scale * std::pow(10.0, options.scale_decades * (rng.uniform() - 0.5));

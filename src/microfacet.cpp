@@ -47,8 +47,7 @@ Vec3d Microfacets::sample(const Vec3d& wi, double u1, double u2) const {
 double Microfacets::pdf(double cos_i, double cos_h, double cos_ih) const {
   if (cos_h <= 0.0) return 0.0;
   const double d = std::exp(log_d(cos_h * cos_h));
-  if (distribution == Distribution::Ggx)
-    return cos_ih > 0.0 ? g1(cos_i) * d * cos_ih / cos_i : 0.0;
+  if (distribution == Distribution::Ggx) return cos_ih > 0.0 ? g1(cos_i) * d * cos_ih / cos_i : 0.0;
   return d * cos_h;
 }
 

@@ -37,8 +37,7 @@ class PathTracer {
       const bool delta = is_delta(*surface.bsdf);
       if (!delta) result += throughput * direct_light(surface, rng);
 
-      const auto next =
-          sample(*surface.bsdf, surface.surface(), surface.wi, rng.uniform3());
+      const auto next = sample(*surface.bsdf, surface.surface(), surface.wi, rng.uniform3());
       if (!next || !passes(surface.at, surface.wi, next->wo)) return result;
       throughput *= weight(surface, *next, last);
       last.p = surface.at.p;
@@ -130,8 +129,7 @@ class PathTracer {
     const Rgbd f = color_of(eval(*at.bsdf, at.surface(), at.wi, wo));
     if (!(f.maxCoeff() > 0.0)) return Rgbd::Zero();
     if (connection_status(scene_, at, emitter, y) != TraceStatus::Ok) return Rgbd::Zero();
-    if (light == nullptr)
-      return f * std::get<PointEmitter>(emitter).intensity / (r2 * choice);
+    if (light == nullptr) return f * std::get<PointEmitter>(emitter).intensity / (r2 * choice);
     const double cosine = -y.n.dot(wo);
     const double density =
         choice / scene_.shapes()[light->shape].extent.area * r2 / cosine;  // per solid angle
@@ -145,7 +143,7 @@ class PathTracer {
     if (!passes(at.at, at.wi, wo)) return Rgbd::Zero();
     const Rgbd f = color_of(eval(*at.bsdf, at.surface(), at.wi, wo));
     if (!(f.maxCoeff() > 0.0)) return Rgbd::Zero();
-    if (scene_.intersect(scene_.leave(at.at.p, at.at.n_g, wo), wo).valid()) return Rgbd::Zero();
+    if (scene_.occluded_to_infinity(scene_.leave(at.at.p, at.at.n_g, wo), wo)) return Rgbd::Zero();
     const double density = environment_pdf(wo);
     if (!(density > 0.0)) return Rgbd::Zero();
     const double w = balance(density, pdf(*at.bsdf, at.surface(), at.wi, wo));
@@ -170,8 +168,8 @@ class Accumulator {
   /// Adds one sample to each pixel. A sample that is not finite is no light: that would be a bias,
   /// so it is counted.
   void pass(std::uint64_t index) {
-    const auto range = tbb::blocked_range2d<int>(0, camera_.film_height, 8, 0, camera_.film_width,
-                                                 32);
+    const auto range =
+        tbb::blocked_range2d<int>(0, camera_.film_height, 8, 0, camera_.film_width, 32);
     tbb::parallel_for(range, [&](const auto& tile) {
       for (int y = tile.rows().begin(); y < tile.rows().end(); ++y)
         for (int x = tile.cols().begin(); x < tile.cols().end(); ++x) add(x, y, index);
@@ -190,9 +188,9 @@ class Accumulator {
 
  private:
   void add(int x, int y, std::uint64_t index) {
-    const std::size_t pixel = static_cast<std::size_t>(y) *
-                                  static_cast<std::size_t>(camera_.film_width) +
-                              static_cast<std::size_t>(x);
+    const std::size_t pixel =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.film_width) +
+        static_cast<std::size_t>(x);
     Rng rng(seed_, Stream::Pixel, index * sums_.size() + pixel);
     const Vec2d jitter = rng.uniform2();
     const Vec2d film{(x + jitter.x()) / camera_.film_width, (y + jitter.y()) / camera_.film_height};
@@ -218,8 +216,8 @@ PathResult run_path(const Scene& scene, const PathOptions& options, const Render
   std::uint64_t passes = 0;
   while (true) {
     const double elapsed = watch.seconds();
-    const double fraction = render.time ? elapsed / *render.time
-                                        : static_cast<double>(passes) / samples_per_pixel;
+    const double fraction =
+        render.time ? elapsed / *render.time : static_cast<double>(passes) / samples_per_pixel;
     if (render.progress) render.progress({std::min(fraction, 1.0), elapsed});
     if (fraction >= 1.0) break;
     result.stopped = render.stop != nullptr && render.stop->load();

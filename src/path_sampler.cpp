@@ -118,8 +118,8 @@ std::optional<PathSampler::Sample> PathSampler::sample(Rng& rng) const {
     vertex.delta = is_delta(*surface.bsdf);
     if (strategy == EndStrategy::Connect && k + 2 == length)
       return connect(std::move(path), surface, rng);
-    const auto next = driftlight::sample(*surface.bsdf, surface.surface(), surface.wi,
-                                         rng.uniform3());
+    const auto next =
+        driftlight::sample(*surface.bsdf, surface.surface(), surface.wi, rng.uniform3());
     if (!next || !passes(surface.at, surface.wi, next->wo)) return std::nullopt;
     vertex.scattering = next->scattering;
     if (!vertex.delta) path.coordinates(topology.block_count++) = next->wo;
@@ -169,7 +169,7 @@ std::optional<PathSampler::Sample> PathSampler::connect(Sample path, const Surfa
                                     : square_to_sphere(square.x(), square.y());
     if (!passes(surface.at, surface.wi, wo)) return std::nullopt;
     const Vec3d start = scene_.leave(surface.at.p, surface.at.n_g, wo);
-    if (scene_.intersect(start, wo).valid()) return std::nullopt;
+    if (scene_.occluded_to_infinity(start, wo)) return std::nullopt;
     vertex.scattering = surface.side(wo);
     topology.end = PathEnd::Environment;
     path.coordinates(topology.block_count++) = wo;

@@ -124,8 +124,7 @@ TraceStatus trace(const Scene& scene, const PathTopology& pattern,
 
 // ---- Chart ----------------------------------------------------------------------------------
 
-Chart::Chart(const Scene& scene, const PathTopology& topology,
-             const PathCoordinates& coordinates)
+Chart::Chart(const Scene& scene, const PathTopology& topology, const PathCoordinates& coordinates)
     : count_(topology.block_count) {
   for (int k = 0; k < count_; ++k) {
     Block& block = blocks_[static_cast<std::size_t>(k)];
@@ -138,9 +137,8 @@ Chart::Chart(const Scene& scene, const PathTopology& topology,
       const Shape& shape = scene.shapes()[light.shape];
       const auto* sphere = std::get_if<Sphere>(&shape.geometry);
       block.radius = sphere != nullptr ? sphere->radius : 0.0;
-      block.normal = sphere != nullptr
-                         ? Vec3d((block.point - sphere->center).normalized())
-                         : emitter_normal(shape, block.point);
+      block.normal = sphere != nullptr ? Vec3d((block.point - sphere->center).normalized())
+                                       : emitter_normal(shape, block.point);
       block.length = shape.extent.radius;
     }
     const TangentBasis basis = tangent_basis(block.normal);

@@ -8,8 +8,7 @@ TraceStatus connection_status(const Scene& scene, const SurfaceHit& from, const 
   const Vec3d edge = y.p - from.at.p;
   const Vec3d start = scene.leave(from.at.p, from.at.n_g, edge);
   const auto* light = std::get_if<AreaEmitter>(&emitter);
-  if (light == nullptr)
-    return scene.occluded(start, y.p) ? TraceStatus::Occluded : TraceStatus::Ok;
+  if (light == nullptr) return scene.occluded(start, y.p) ? TraceStatus::Occluded : TraceStatus::Ok;
   if (y.n.dot(edge) >= 0.0) return TraceStatus::Missed;
   // The first thing in this direction must be y itself: rounding decides nothing but the
   // primitive, and a part of the same shape in front of y is told apart by its distance.

@@ -76,7 +76,8 @@ class ChainRunner {
     double seconds = 0.1;
     if (render_.time) seconds = std::min(seconds, *render_.time - elapsed);
     const double rate = static_cast<double>(done) / std::max(elapsed, 1e-6);
-    return static_cast<std::uint64_t>(std::clamp(rate * seconds, 1.0, 16.0 * static_cast<double>(done)));
+    return static_cast<std::uint64_t>(
+        std::clamp(rate * seconds, 1.0, 16.0 * static_cast<double>(done)));
   }
 
   std::vector<std::unique_ptr<Chain>>& chains_;

@@ -133,9 +133,9 @@ Eigen::AlignedBox3d bounds_of(const Disk& disk) {
 
 RTCGeometry embree_geometry(RTCDevice device, const TriangleMesh& mesh) {
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* vertices = static_cast<float*>(
-      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                              3 * sizeof(float), mesh.positions.size()));
+  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
+                                                               RTC_FORMAT_FLOAT3, 3 * sizeof(float),
+                                                               mesh.positions.size()));
   for (const auto& p : mesh.positions) vertices = std::copy_n(p.data(), 3, vertices);
   auto* indices = static_cast<std::uint32_t*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
@@ -249,9 +249,7 @@ bool uses_texture(const Bsdf& bsdf) {
   struct Visitor {
     bool operator()(const Diffuse& b) const { return !b.reflectance.is_constant(); }
     bool operator()(const Conductor& b) const { return !b.specular_reflectance.is_constant(); }
-    bool operator()(const RoughConductor& b) const {
-      return !b.specular_reflectance.is_constant();
-    }
+    bool operator()(const RoughConductor& b) const { return !b.specular_reflectance.is_constant(); }
     bool operator()(const Dielectric& b) const {
       return !b.specular_reflectance.is_constant() || !b.specular_transmittance.is_constant();
     }
@@ -319,8 +317,7 @@ EmitterPoint Scene::sample_area(const AreaEmitter& emitter, double u1, double u2
   }
   if (const auto* disk = std::get_if<Disk>(&shape.geometry)) {
     const Vec2d s = square_to_disk(u1, u2);
-    return {disk->center + s.x() * disk->u + s.y() * disk->v,
-            disk->u.cross(disk->v).normalized()};
+    return {disk->center + s.x() * disk->u + s.y() * disk->v, disk->u.cross(disk->v).normalized()};
   }
   const auto& mesh = std::get<TriangleMesh>(shape.geometry);
   const auto i = static_cast<std::uint32_t>(shape.triangles.sample(u1));
@@ -420,14 +417,15 @@ Scene SceneBuilder::build() {
   for (const Emitter& emitter : scene.emitters_)
     powers.push_back(power(emitter, scene.shapes_, scene.radius_));
   scene.emitter_choice_ = DiscreteDistribution(powers);
-  if (!(scene.emitter_choice_.total() > 0.0)) throw InputError("all emitters of the scene are black");
+  if (!(scene.emitter_choice_.total() > 0.0))
+    throw InputError("all emitters of the scene are black");
 
   // User geometries point into shapes_, which does not move from here on.
   scene.accelerator_ = std::make_unique<Scene::Accelerator>();
   for (const Shape& shape : scene.shapes_) {
-    RTCGeometry geometry = std::visit(
-        [&](const auto& s) { return embree_geometry(scene.accelerator_->device, s); },
-        shape.geometry);
+    RTCGeometry geometry =
+        std::visit([&](const auto& s) { return embree_geometry(scene.accelerator_->device, s); },
+                   shape.geometry);
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene.accelerator_->scene, geometry);
     rtcReleaseGeometry(geometry);

@@ -87,7 +87,8 @@ const std::vector<test::Moments>& traced_tiles(const Work& work) {
     tiles = tiles_over_runs([&](std::uint64_t seed) {
       RenderOptions render;
       render.seed = 1000 + seed;
-      return render_path(loaded.scene, PathOptions{loaded.max_depth.value()}, render, work.samples_per_pixel)
+      return render_path(loaded.scene, PathOptions{loaded.max_depth.value()}, render,
+                         work.samples_per_pixel)
           .image;
     });
   }
@@ -128,14 +129,13 @@ TEST_P(LangevinEqualsPath, TileMeans) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Scenes, LangevinEqualsPath,
-    testing::Values(Work{"furnace_sphere", 64, 200, 50000, 0.01},
-                    Work{"cornell_glossy", 300, 300, 100000, 0.04},
-                    Work{"glass_caustic", 1200, 400, 1000000, 0.05},
-                    Work{"small_hole", 400, 400, 200000, 0.08},
-                    Work{"glossy_chain", 600, 300, 400000, 0.12}),
-    [](const auto& instance) { return std::string(instance.param.scene); });
+INSTANTIATE_TEST_SUITE_P(Scenes, LangevinEqualsPath,
+                         testing::Values(Work{"furnace_sphere", 64, 200, 50000, 0.01},
+                                         Work{"cornell_glossy", 300, 300, 100000, 0.04},
+                                         Work{"glass_caustic", 1200, 400, 1000000, 0.05},
+                                         Work{"small_hole", 400, 400, 200000, 0.08},
+                                         Work{"glossy_chain", 600, 300, 400000, 0.12}),
+                         [](const auto& instance) { return std::string(instance.param.scene); });
 
 /// A closed sphere of radiance L and albedo rho shows L (1 - rho^n) / (1 - rho) everywhere.
 TEST(ClosedSphere, HasItsClosedForm) {
@@ -177,7 +177,8 @@ class SharedReference : public testing::Test {
   Image render(int samples_per_pixel, std::uint64_t seed = 1) const {
     RenderOptions options;
     options.seed = seed;
-    return render_path(scene_->scene, PathOptions{scene_->max_depth.value()}, options, samples_per_pixel)
+    return render_path(scene_->scene, PathOptions{scene_->max_depth.value()}, options,
+                       samples_per_pixel)
         .image;
   }
 

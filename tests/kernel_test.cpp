@@ -230,18 +230,6 @@ TEST(StepDistribution, SampleFollowsItsDensity) {
   }
 }
 
-// Law: inverse_of_spd inverts, and refuses what is not positive definite.
-TEST(InverseOfSpd, InvertsOrRefuses) {
-  Rng rng(27, Stream::Test, 0);
-  LocalState state = random_state(6, 1.0, rng);
-  Matrix lower = state.q.triangularView<Eigen::Lower>();
-  const auto inverse = inverse_of_spd(lower);
-  ASSERT_TRUE(inverse.has_value());
-  EXPECT_LT((state.q * *inverse - Matrix::Identity(6, 6)).norm(), 1e-9);
-  lower(3, 3) = -1.0;
-  EXPECT_FALSE(inverse_of_spd(lower).has_value());
-}
-
 // Law: log10 of the scale is uniform over the decades about the option, and fixed without them.
 TEST(DrawScale, LogUniform) {
   Rng rng(28, Stream::Test, 0);
@@ -307,8 +295,7 @@ ChainState turned_state(const Scene& scene, const KernelOptions& options,
     state.chart.rotate(k, 2.0 * kPi * rng.uniform());
   PathDerivatives derivatives;
   differentiate(scene, topology, state.chart, {}, derivatives);
-  const Vector div =
-      divergence(scene, topology, state.chart, inverse_of_spd(derivatives.q).value());
+  const Vector div = divergence(scene, topology, state.chart, derivatives.q);
   state.step = StepDistribution(options, derivatives.q, &derivatives.gradient, &div);
   return state;
 }

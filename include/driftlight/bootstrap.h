@@ -11,8 +11,8 @@
 namespace driftlight {
 
 /// Learns the sampler's table from a pilot of `count` samples, then draws `count` samples with
-/// weights w = f / q: b = E[w]. Sample i comes from its own stream, so that any of them can be drawn
-/// again, bit for bit. Runs in the current TBB arena; the result does not depend on its size.
+/// weights w = f / q: b = E[w]. Sample i comes from its own stream, so that any of them can be
+/// drawn again, bit for bit. Runs in the current TBB arena; the result does not depend on its size.
 class Bootstrap {
  public:
   Bootstrap(PathSampler& sampler, const Scene& scene, int count, std::uint64_t seed);

@@ -3,7 +3,8 @@
 ///
 /// Conventions: wi points toward the previous vertex (the sensor's side), wo toward the next, both
 /// unit and leaving the surface; n is the unit shading normal. Radiance flows from wo to wi.
-/// `eval` includes |n . wo|. All BSDFs here are isotropic, so the normal is all the frame they need.
+/// `eval` includes |n . wo|. All BSDFs here are isotropic, so the normal is all the frame they
+/// need.
 #pragma once
 
 #include <optional>
@@ -136,8 +137,7 @@ ScaledColor<T> eval_bsdf(const RoughConductor& b, const SurfacePoint<T>& at, con
   const Microfacets& m = b.microfacets;
   const T g = m.g1(cos_i) * m.g1(cos_o);
   const Rgb<T> fresnel = fresnel_conductor(T(0.5 * sqrt(h2)), b.eta, b.k);
-  return {m.log_d(cos_h2) + log(g / (4.0 * cos_i)),
-          fresnel * b.specular_reflectance.eval(at.uv)};
+  return {m.log_d(cos_h2) + log(g / (4.0 * cos_i)), fresnel * b.specular_reflectance.eval(at.uv)};
 }
 
 template <Scalar T>
@@ -150,8 +150,7 @@ ScaledColor<T> eval_bsdf(const Diffuse& b, const SurfacePoint<T>& at, const Vec3
 }
 
 template <Scalar T>
-ScaledColor<T> eval_bsdf(const Conductor&, const SurfacePoint<T>&, const Vec3<T>&,
-                         const Vec3<T>&) {
+ScaledColor<T> eval_bsdf(const Conductor&, const SurfacePoint<T>&, const Vec3<T>&, const Vec3<T>&) {
   return ScaledColor<T>::zero();
 }
 
@@ -161,8 +160,8 @@ ScaledColor<T> eval_bsdf(const Dielectric&, const SurfacePoint<T>&, const Vec3<T
   return ScaledColor<T>::zero();
 }
 
-/// With the (unnormalised) half vector h = wi + e wo, e = 1 for reflection and the index beyond over
-/// the index on the side of wi for transmission:
+/// With the (unnormalised) half vector h = wi + e wo, e = 1 for reflection and the index beyond
+/// over the index on the side of wi for transmission:
 ///   reflection    F D G / (4 |cos_i|)
 ///   transmission  (1 - F) D G |wi.h wo.h| / (|cos_i| (wi.h + e wo.h)^2)
 /// per unit half vector; e^2 of Walter et al. and the 1 / e^2 of radiance cancel, and so do the

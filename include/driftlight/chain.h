@@ -22,7 +22,7 @@ struct ChainState {
   Contribution contribution;
   Chart chart;
   StepDistribution step;
-  bool has_step = false;   ///< chart and step are computed
+  bool has_step = false;  ///< chart and step are computed
   /// log (f / q), the weight of a large step; NaN until it is needed.
   double log_weight = std::numeric_limits<double>::quiet_NaN();
 };

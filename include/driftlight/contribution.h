@@ -70,8 +70,8 @@ class ContributionVisitor : public WalkVisitor<T> {
 
 /// The contribution as numbers.
 struct Contribution {
-  double log_target = 0;        ///< log luminance(f)
-  Rgbd color = Rgbd::Zero();    ///< f / luminance(f); what a splat of unit target deposits
+  double log_target = 0;      ///< log luminance(f)
+  Rgbd color = Rgbd::Zero();  ///< f / luminance(f); what a splat of unit target deposits
 };
 
 /// Evaluates f. A path without contribution has log_target = -infinity; a degenerate one may be

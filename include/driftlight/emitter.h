@@ -48,7 +48,8 @@ class EnvironmentMap {
     const T dz = dot(axis_z_, d);
     const T x = atan2(dx, -dz) * (0.5 * kInvPi * static_cast<double>(bitmap_.width));
     // Rounding may carry |dy| past 1; there the map is constant in v.
-    const T theta = std::abs(value(dy)) < 1.0 ? T(acos(dy)) : constant<T>(value(dy) > 0 ? 0.0 : kPi);
+    const T theta =
+        std::abs(value(dy)) < 1.0 ? T(acos(dy)) : constant<T>(value(dy) > 0 ? 0.0 : kPi);
     const T y = theta * (kInvPi * static_cast<double>(bitmap_.height));
     Rgb<T> c = lookup(bitmap_, x, y, Wrap::Repeat, Wrap::Clamp);
     for (int i = 0; i < 3; ++i) c[i] = c[i] * scale_;

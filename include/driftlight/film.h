@@ -11,8 +11,8 @@
 
 namespace driftlight {
 
-/// Box filter of one pixel. Splats are colours of luminance `weight` <= 1 (see Contribution::color),
-/// so that a component is at most 14 and 2^28 splats fit a pixel.
+/// Box filter of one pixel. Splats are colours of luminance `weight` <= 1 (see
+/// Contribution::color), so that a component is at most 14 and 2^28 splats fit a pixel.
 class Film {
  public:
   Film(int width, int height);

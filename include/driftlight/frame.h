@@ -21,8 +21,7 @@ T dot(const Vec3<T>& a, const Vec3<T>& b) {
   return a.x() * b.x() + a.y() * b.y() + a.z() * b.z();
 }
 template <Scalar T>
-  requires(ScalarTraits<T>::is_jet)
-T dot(const Vec3d& a, const Vec3<T>& b) {
+requires(ScalarTraits<T>::is_jet) T dot(const Vec3d& a, const Vec3<T>& b) {
   return a.x() * b.x() + a.y() * b.y() + a.z() * b.z();
 }
 
@@ -52,8 +51,8 @@ Vec3<T> reflect(const Vec3<T>& w, const Vec3<T>& n) {
 
 /// Direction of w refracted at the unit normal n; both w and the result leave the surface.
 /// `eta` is the index beyond the surface over the index on the side of w (n may lie on either
-/// side). With c = n.w and s = sign(c): wo = -w / eta + (c / eta - s sqrt(1 - (1 - c^2) / eta^2)) n.
-/// Total internal reflection gives a non-finite result: callers ask fresnel first.
+/// side). With c = n.w and s = sign(c): wo = -w / eta + (c / eta - s sqrt(1 - (1 - c^2) / eta^2))
+/// n. Total internal reflection gives a non-finite result: callers ask fresnel first.
 template <Scalar T>
 Vec3<T> refract(const Vec3<T>& w, const Vec3<T>& n, double eta) {
   using std::sqrt;

@@ -16,8 +16,8 @@
 namespace driftlight {
 
 /// World-space triangles, counter-clockwise about the outer side. `normals` and `uvs` are empty or
-/// as long as `positions`. With normals, they are interpolated for shading, and the geometric normal
-/// takes their side. Without uvs, texture coordinates are the barycentric ones.
+/// as long as `positions`. With normals, they are interpolated for shading, and the geometric
+/// normal takes their side. Without uvs, texture coordinates are the barycentric ones.
 struct TriangleMesh {
   std::vector<Eigen::Vector3f> positions;
   std::vector<Eigen::Vector3f> normals;
@@ -25,8 +25,9 @@ struct TriangleMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-/// uv = (phi / (2 pi), theta / pi) in the sphere's own frame, whose axes are the rows of `to_local`.
-/// A hit's primitive is the root of the quadratic: 0 where the ray enters, 1 where it leaves.
+/// uv = (phi / (2 pi), theta / pi) in the sphere's own frame, whose axes are the rows of
+/// `to_local`. A hit's primitive is the root of the quadratic: 0 where the ray enters, 1 where it
+/// leaves.
 struct Sphere {
   Vec3d center{0, 0, 0};
   double radius = 1;

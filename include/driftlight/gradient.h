@@ -22,7 +22,7 @@ struct PathDerivatives {
   bool all_finite(const DerivativeRequest& request) const;
 };
 
-/// Derivatives at the chart's base point, by ceres::Jet in one pass (or in passes of 16 coordinates
+/// Derivatives at the chart's base point, by ceres::Jet in one pass (or in passes of 8 coordinates
 /// for longer paths).
 void differentiate(const Scene& scene, const PathTopology& topology, const Chart& chart,
                    const DerivativeRequest& request, PathDerivatives& result);
@@ -31,11 +31,11 @@ void differentiate(const Scene& scene, const PathTopology& topology, const Chart
 void constraint_matrix(const Scene& scene, const PathTopology& topology, const Chart& chart,
                        const Vector& delta, Matrix& q);
 
-/// div(Q^-1)_i = sum_j d(Q^-1)_ij / d delta_j at the chart's base point, given Q^-1 there:
+/// div(Q^-1)_i = sum_j d(Q^-1)_ij / d delta_j at the chart's base point, given Q there:
 /// dQ^-1 = -Q^-1 dQ Q^-1 with dQ by central differences in the chart, 2 d evaluations of Q.
-/// Non-finite where a displaced path does not exist.
+/// Non-finite where a displaced path does not exist or Q is not positive definite.
 Vector divergence(const Scene& scene, const PathTopology& topology, const Chart& chart,
-                  const Matrix& q_inverse);
+                  const Matrix& q);
 
 /// Floor that keeps Q positive definite: pi^-2 on the diagonal (DESIGN 1.5).
 inline constexpr double kConstraintFloor = kInvPi * kInvPi;

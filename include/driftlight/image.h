@@ -47,11 +47,11 @@ void check_writable(const std::filesystem::path& file);
 
 /// Figures of the difference between an image and a reference, over all pixels and channels.
 struct Difference {
-  double mse = 0;     ///< mean of (I - R)^2
-  double relmse = 0;  ///< mean of (I - R)^2 / (R^2 + 0.01)
+  double mse = 0;             ///< mean of (I - R)^2
+  double relmse = 0;          ///< mean of (I - R)^2 / (R^2 + 0.01)
   double relmse_trimmed = 0;  ///< without the 0.1 % of pixels with the largest relMSE
-  double mape = 0;    ///< mean of |I - R| / (|R| + 0.01)
-  double mean = 0;    ///< mean of I over mean of R
+  double mape = 0;            ///< mean of |I - R| / (|R| + 0.01)
+  double mean = 0;            ///< mean of I over mean of R
 };
 
 /// Throws InputError if the sizes differ.

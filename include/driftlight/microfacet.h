@@ -29,14 +29,14 @@ struct Microfacets {
   /// Smith's shadowing of one direction from its cosine with the normal.
   ///   GGX       G1 = 2 / (1 + sqrt(1 + alpha^2 tan^2))
   ///   Beckmann  the rational fit of Walter et al. in a = 1 / (alpha tan); it is 1 from a = 1.6 on;
-  ///             there the value is continuous and the slope jumps a little: the branch keeps the published fit.
+  ///             there the value is continuous and the slope jumps a little: the branch keeps the
+  ///             published fit.
   template <Scalar T>
   T g1(const T& cosine) const {
     using std::sqrt;
     const T cos2 = cosine * cosine;
     const T tan2 = (1.0 - cos2) / cos2;
-    if (distribution == Distribution::Ggx)
-      return 2.0 / (1.0 + sqrt(1.0 + alpha * alpha * tan2));
+    if (distribution == Distribution::Ggx) return 2.0 / (1.0 + sqrt(1.0 + alpha * alpha * tan2));
     if (value(tan2) * alpha * alpha * 1.6 * 1.6 <= 1.0) return constant<T>(1.0);
     const T a = 1.0 / (alpha * sqrt(tan2));
     return a * (3.535 + 2.181 * a) / (1.0 + a * (2.276 + 2.577 * a));

@@ -35,8 +35,8 @@ struct KernelOptions {
   /// Upper bound of dt; 1/3 is that of (E63.9).
   double time_step_cap = 1.0 / 3.0;
   /// Factor on T. With the identity preconditioner it is the standard deviation of a step, in
-  /// radians, at dt = 1/3. The default pair, 0.1 to 1, was at or near the lowest error at equal time
-  /// on all scenes tried; scale 1 alone is right where the constraints are tight and all of f.
+  /// radians, at dt = 1/3. The default pair, 0.1 to 1, was at or near the lowest error at equal
+  /// time on all scenes tried; scale 1 alone is right where the constraints are tight and all of f.
   double scale = 0.32;
   /// If positive, each step draws its scale log-uniformly over this many decades about `scale`.
   double scale_decades = 1;
@@ -68,7 +68,7 @@ struct PathOptions {
 /// One option by name, bound to a field.
 struct OptionEntry {
   std::string_view name;
-  std::string values;         ///< what it accepts
+  std::string values;  ///< what it accepts
   std::string_view help;
   std::function<std::string()> get;
   std::function<void(const std::string&)> set;  ///< throws OptionError

@@ -31,8 +31,8 @@ struct PathVertex {
   Scattering scattering = Scattering::Reflection;
 };
 
-/// The discrete choices of a path; for a fixed topology the contribution is a smooth function of the
-/// coordinates. The first `scatter_count` vertices scatter; with PathEnd::Hit one more vertex
+/// The discrete choices of a path; for a fixed topology the contribution is a smooth function of
+/// the coordinates. The first `scatter_count` vertices scatter; with PathEnd::Hit one more vertex
 /// follows, on the emitter.
 struct PathTopology {
   std::array<PathVertex, kMaxPathLength> vertices;

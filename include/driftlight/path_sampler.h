@@ -24,8 +24,8 @@ enum class EndStrategy : std::uint8_t { Hit, Connect };
 /// sampling at each vertex, and either whatever the last direction hits or a connection to a drawn
 /// emitter point. The density of a path is the sum over both strategies,
 ///   q(X) = W(v_0) prod_k p(v_k) [ c_(n,hit) p(v_last) + c_(n,connect) p_emitter ],
-/// in the measure of its coordinates, with delta vertices by their probability; f / q is measure-free
-/// and is the weight of the balance heuristic.
+/// in the measure of its coordinates, with delta vertices by their probability; f / q is
+/// measure-free and is the weight of the balance heuristic.
 class PathSampler {
  public:
   /// All lengths up to max_depth and both strategies equally likely.
@@ -52,8 +52,7 @@ class PathSampler {
   double log_density(const PathTopology& topology, const PathCoordinates& coordinates) const;
 
  private:
-  std::optional<Sample> end_by_hit(Sample path, RayFollower& follower,
-                                   const Bsdf* last_bsdf) const;
+  std::optional<Sample> end_by_hit(Sample path, RayFollower& follower, const Bsdf* last_bsdf) const;
   std::optional<Sample> connect(Sample path, const SurfaceHit& surface, Rng& rng) const;
 
   const Scene& scene_;

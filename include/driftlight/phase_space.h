@@ -12,8 +12,8 @@ namespace driftlight {
 
 /// Vectors and matrices over the coordinates of a path; never allocate.
 using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxDimension, 1>;
-using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
-                             kMaxDimension, kMaxDimension>;
+using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxDimension,
+                             kMaxDimension>;
 
 /// What became of a trace.
 enum class TraceStatus : std::uint8_t {
@@ -39,18 +39,18 @@ bool passes(const Interaction<double>& at, const Vec3d& wi, const Vec3d& wo);
 TraceStatus trace(const Scene& scene, const PathTopology& pattern,
                   const PathCoordinates& coordinates, PathTopology& result);
 
-/// Tangent coordinates delta about a point of the phase space: for each block an orthogonal basis of
-/// the tangent plane, of unit length for directions and of the length of the emitter's radius for
-/// emitter points, so that a unit step is of the size of the emitter.
+/// Tangent coordinates delta about a point of the phase space: for each block an orthogonal basis
+/// of the tangent plane, of unit length for directions and of the length of the emitter's radius
+/// for emitter points, so that a unit step is of the size of the emitter.
 class Chart {
  public:
   /// A plane or a sphere that a block lives on.
   struct Block {
-    Vec3d t, b;     ///< tangents
-    Vec3d normal;   ///< unit; for sphere blocks the position is center + radius * normal
-    double length = 1;   ///< of t and b
-    double radius = 1;   ///< of the sphere; 0: a plane
-    Vec3d point;    ///< the base point itself
+    Vec3d t, b;         ///< tangents
+    Vec3d normal;       ///< unit; for sphere blocks the position is center + radius * normal
+    double length = 1;  ///< of t and b
+    double radius = 1;  ///< of the sphere; 0: a plane
+    Vec3d point;        ///< the base point itself
   };
 
   Chart() = default;

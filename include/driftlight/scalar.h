@@ -86,16 +86,6 @@ T constant(double k) {
   }
 }
 
-/// A quantity with one level of differentiation less, as a constant of type T.
-template <Scalar T>
-T lift(const Stripped<T>& x) {
-  if constexpr (ScalarTraits<T>::is_jet) {
-    return T(x);
-  } else {
-    return x;
-  }
-}
-
 template <Scalar T>
 Vec2<T> constant(const Vec2d& v) {
   return {constant<T>(v.x()), constant<T>(v.y())};

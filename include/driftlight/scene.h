@@ -40,8 +40,8 @@ struct Shape {
   std::uint32_t material = 0;
   std::optional<std::uint32_t> emitter;
   ShapeExtent extent;
-  bool textured = false;            ///< some BSDF of the material looks at uv
-  DiscreteDistribution triangles;   ///< by area; only for meshes that emit
+  bool textured = false;           ///< some BSDF of the material looks at uv
+  DiscreteDistribution triangles;  ///< by area; only for meshes that emit
 };
 
 /// A point drawn on an emitter, for a connection.
@@ -107,6 +107,7 @@ class Scene {
   }
   /// Uniform point on the shape of an area emitter, density 1 / area.
   EmitterPoint sample_area(const AreaEmitter& emitter, double u1, double u2) const;
+
  private:
   friend class SceneBuilder;
   struct Accelerator;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// The walk along a path of fixed topology: the one place that turns coordinates into vertices.
 ///
-/// The contribution, the constraints and the sampling density of a path are visitors of the walk. It
-/// is pure in (scene, topology, coordinates): no Embree, no random numbers, no allocation.
+/// The contribution, the constraints and the sampling density of a path are visitors of the walk.
+/// It is pure in (scene, topology, coordinates): no Embree, no random numbers, no allocation.
 #pragma once
 
 #include "driftlight/path.h"
@@ -81,8 +81,8 @@ void walk(const Scene& scene, const PathTopology& topology, const Blocks& blocks
     if (!connects) {
       ray.origin = at.p;
       if (vertex.delta) {
-        ray.direction = delta_direction(bsdf, SurfacePoint<T>{at.n_s, at.uv}, wi,
-                                        vertex.scattering);
+        ray.direction =
+            delta_direction(bsdf, SurfacePoint<T>{at.n_s, at.uv}, wi, vertex.scattering);
         visitor.delta({bsdf, shape, at, wi, ray.direction, vertex.scattering});
       } else {
         ray.direction = blocks(next_block++);
@@ -92,8 +92,8 @@ void walk(const Scene& scene, const PathTopology& topology, const Blocks& blocks
     }
     const Emitter& emitter = scene.emitters()[topology.emitter];
     const bool area = topology.end == PathEnd::AreaConnection;
-    const Vec3<T> y = area ? Vec3<T>(blocks(next_block))
-                           : constant<T>(std::get<PointEmitter>(emitter).position);
+    const Vec3<T> y =
+        area ? Vec3<T>(blocks(next_block)) : constant<T>(std::get<PointEmitter>(emitter).position);
     const Vec3<T> edge = y - at.p;
     const T r2 = dot(edge, edge);
     const Vec3<T> wo = scaled(edge, constant<T>(1.0) / sqrt(r2));
