@@ -88,6 +88,7 @@ void PathSampler::learn(const std::vector<RunningMean>& weights) {
   }
   if (!(energy > 0.0)) return;
   std::vector<double> probabilities;
+  probabilities.reserve(weights.size());
   for (const RunningMean& w : weights)
     probabilities.push_back(0.45 * w.sum / energy + 0.45 * std::sqrt(w.sum_of_squares) / spread +
                             0.1 / static_cast<double>(weights.size()));
