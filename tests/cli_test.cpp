@@ -2,12 +2,14 @@
 /// The program as users meet it: exit codes, messages, files, signals, determinism.
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <csignal>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "driftlight/image.h"
