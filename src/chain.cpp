@@ -22,15 +22,15 @@ void prepare_step(const Scene& scene, const KernelOptions& options, ChainState& 
   const int dimension = state.chart.dimension();
   PathDerivatives derivatives;
   differentiate(scene, state.topology, state.chart, request, derivatives);
-  // What is not finite is left out, which is a function of the state like all else here.
-  const bool use_gradient = request.gradient && derivatives.gradient.allFinite();
-  const Vector* gradient = use_gradient ? &derivatives.gradient : nullptr;
-  if (!request.constraints || !derivatives.q.allFinite()) {
+  state.finite = derivatives.all_finite(request);
+  if (!state.finite) return;
+  const Vector* gradient = request.gradient ? &derivatives.gradient : nullptr;
+  if (!request.constraints) {
     state.step = StepDistribution(options, dimension, gradient);
     return;
   }
   std::optional<Vector> div;
-  if (options.drift == Drift::Full && use_gradient)
+  if (options.drift == Drift::Full)
     div = divergence(scene, state.topology, state.chart, derivatives.q);
   state.step = StepDistribution(options, derivatives.q, gradient, div ? &*div : nullptr);
 }
@@ -89,6 +89,10 @@ std::optional<double> Chain::propose_small() {
   ChainState& to = proposed();
   const KernelOptions& options = options_.kernel;
   if (!from.has_step) prepare_step(scene_, options, from);
+  if (!from.finite) {
+    ++statistics_.rejections.non_finite;
+    return std::nullopt;
+  }
   const double scale = draw_scale(options, rng_);
   const Vector delta = from.step.sample(scale, rng_);
   if (!delta.allFinite()) {
@@ -98,6 +102,10 @@ std::optional<double> Chain::propose_small() {
   to.coordinates = from.chart.retract(delta);
   if (!evaluate_proposed()) return std::nullopt;
   prepare_step(scene_, options, to);
+  if (!to.finite) {
+    ++statistics_.rejections.non_finite;
+    return std::nullopt;
+  }
   const auto there = from.chart.inverse(to.coordinates);
   const auto back = to.chart.inverse(from.coordinates);
   if (!there || !back) return std::nullopt;

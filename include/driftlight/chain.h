@@ -23,6 +23,7 @@ struct ChainState {
   Chart chart;
   StepDistribution step;
   bool has_step = false;  ///< chart and step are computed
+  bool finite = true;     ///< the derivatives behind the step are; else there is none
   /// log (f / q), the weight of a large step; NaN until it is needed.
   double log_weight = std::numeric_limits<double>::quiet_NaN();
 };
@@ -32,7 +33,8 @@ struct ChainState {
 double log_acceptance(double log_target_from, double log_target_to, double log_pdf_forward,
                       double log_pdf_reverse);
 
-/// Chart and step distribution of a state, by the kernel's options.
+/// Chart and step distribution of a state, by the kernel's options. A state whose derivatives are
+/// not finite has no step, from or to it: a function of the state, so the balance holds.
 void prepare_step(const Scene& scene, const KernelOptions& options, ChainState& state);
 
 class Chain {
