@@ -78,19 +78,23 @@ void value_of_path(benchmark::State& bench, const std::string& name) {
 
 void derivatives(benchmark::State& bench, const std::string& name,
                  const DerivativeRequest& request) {
-  PathDerivatives result;
+  Linearization result;
   over_states(bench, name, [&](const Scene& scene, const ChainState& state) {
-    differentiate(scene, state.topology, state.chart, request, result);
-    benchmark::DoNotOptimize(result.gradient.data());
+    linearize(scene, state.topology, state.chart, KernelOptions{}.derivatives, request, result);
+    benchmark::DoNotOptimize(&result);
+    benchmark::ClobberMemory();
   });
 }
 
 void factorisation(benchmark::State& bench, const std::string& name) {
-  std::map<const ChainState*, PathDerivatives> known;
+  std::map<const ChainState*, Linearization> known;
   over_states(bench, name, [&](const Scene& scene, const ChainState& state) {
-    PathDerivatives& d = known[&state];
-    if (d.q.size() == 0) differentiate(scene, state.topology, state.chart, {}, d);
-    benchmark::DoNotOptimize(StepDistribution(KernelOptions{}, d.q, &d.gradient, nullptr));
+    Linearization& path = known[&state];
+    if (path.stage_count == 0)
+      linearize(scene, state.topology, state.chart, KernelOptions{}.derivatives, {}, path);
+    const int dimension = state.chart.dimension();
+    benchmark::DoNotOptimize(
+        StepDistribution(KernelOptions{}, dimension, RiccatiFactor(path), &path.gradient, nullptr));
   });
 }
 

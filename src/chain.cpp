@@ -20,19 +20,23 @@ void prepare_step(const Scene& scene, const KernelOptions& options, ChainState& 
   state.chart = Chart(scene, state.topology, state.coordinates);
   state.has_step = true;
   const int dimension = state.chart.dimension();
-  PathDerivatives derivatives;
-  differentiate(scene, state.topology, state.chart, request, derivatives);
-  state.finite = derivatives.all_finite(request);
-  if (!state.finite) return;
-  const Vector* gradient = request.gradient ? &derivatives.gradient : nullptr;
-  if (!request.constraints) {
-    state.step = StepDistribution(options, dimension, gradient);
-    return;
+  Linearization path;
+  linearize(scene, state.topology, state.chart, options.derivatives, request, path);
+  Factor factor = IdentityFactor(dimension);
+  state.finite = path.gradient.allFinite();
+  if (request.constraints) {
+    RiccatiFactor riccati(path);
+    state.finite = state.finite && riccati.status() != RiccatiFactor::Status::NonFinite;
+    if (riccati.status() == RiccatiFactor::Status::Ok) factor = riccati;
   }
+  if (!state.finite) return;
   std::optional<Vector> div;
-  if (options.drift == Drift::Full)
-    div = divergence(scene, state.topology, state.chart, derivatives.q);
-  state.step = StepDistribution(options, derivatives.q, gradient, div ? &*div : nullptr);
+  if (options.drift == Drift::Full && !std::holds_alternative<IdentityFactor>(factor)) {
+    div = divergence(scene, state.topology, state.chart);
+    if (!div->allFinite()) div.reset();
+  }
+  state.step = StepDistribution(options, dimension, std::move(factor),
+                                request.gradient ? &path.gradient : nullptr, div ? &*div : nullptr);
 }
 
 Chain::Chain(const Scene& scene, const PathSampler& sampler, const LangevinOptions& options,

@@ -34,6 +34,26 @@ EnvironmentMap::EnvironmentMap(Bitmap bitmap, const Eigen::Matrix3d& to_world, d
   total_ = rows_.total();
 }
 
+/// With (X, Y, Z) the coordinates of d in map space, x = width / (2 pi) atan2(X, -Z) and
+/// y = height / pi acos(Y):
+///   dx = width / (2 pi) (X dZ - Z dX) / (X^2 + Z^2),   dy = -height / pi dY / sqrt(1 - Y^2).
+Eigen::Matrix3d EnvironmentMap::gradient(const Vec3d& d) const {
+  const double dx = axis_x_.dot(d);
+  const double dy = axis_y_.dot(d);
+  const double dz = axis_z_.dot(d);
+  const double per_x = 0.5 * kInvPi * bitmap_.width;
+  const double per_y = kInvPi * bitmap_.height;
+  const double x = std::atan2(dx, -dz) * per_x;
+  const double y = std::acos(std::clamp(dy, -1.0, 1.0)) * per_y;
+  const Vec3d x_gradient = per_x / (dx * dx + dz * dz) * (dx * axis_z_ - dz * axis_x_);
+  // At the poles the map is constant in v, as in `eval`.
+  const double sine2 = 1.0 - dy * dy;
+  const Vec3d y_gradient = (sine2 > 0.0 ? -per_y / std::sqrt(sine2) : 0.0) * axis_y_;
+  const BilinearPatch patch(bitmap_, x, y, Wrap::Repeat, Wrap::Clamp);
+  return scale_ * (patch.slope_x(y).matrix() * x_gradient.transpose() +
+                   patch.slope_y(x).matrix() * y_gradient.transpose());
+}
+
 /// Patch row r spans the map's y in [r - 1/2, r + 1/2], cut at the poles.
 double EnvironmentMap::patch_solid_angle(int row) const {
   const double height = bitmap_.height;

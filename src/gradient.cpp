@@ -7,13 +7,11 @@
 
 #include "driftlight/constraints.h"
 #include "driftlight/contribution.h"
+#include "driftlight/linearization.h"
+#include "visitor_pair.h"
 
 namespace driftlight {
 namespace {
-
-/// Most residuals of a path: two of the film, three of each position, six of each scattering (two
-/// lobes), three of the environment.
-constexpr int kMaxResiduals = 2 + 9 * kMaxPathLength + 3;
 
 /// Jets of a path about the base point of a chart: coordinates [first, first + N) are seeded.
 template <int N>
@@ -99,40 +97,6 @@ class JacobianRows {
   int count_ = 0;
 };
 
-/// Both visitors in one walk.
-template <Scalar T>
-struct TargetAndConstraints {
-  ContributionVisitor<T> target;
-  ConstraintVisitor<T, JacobianRows> constraints;
-
-  explicit TargetAndConstraints(JacobianRows& rows) : constraints(rows) {}
-
-  void sensor(const PerspectiveCamera& camera, const Vec3<T>& v) {
-    target.sensor(camera, v);
-    constraints.sensor(camera, v);
-  }
-  void position(const Shape& shape, const Vec3<T>& p) { constraints.position(shape, p); }
-  void scatter(const ScatterEvent<T>& e) {
-    target.scatter(e);
-    constraints.scatter(e);
-  }
-  void connect(const ScatterEvent<T>& e) { scatter(e); }
-  void delta(const ScatterEvent<T>& e) { target.delta(e); }
-  void hit(const AreaEmitter& emitter, const T& cosine, const T& r2) {
-    target.hit(emitter, cosine, r2);
-  }
-  void environment(const Emitter& emitter, const Vec3<T>& v) {
-    target.environment(emitter, v);
-    constraints.environment(emitter, v);
-  }
-  void area_connection(const AreaEmitter& emitter, const T& cosine, const T& r2) {
-    target.area_connection(emitter, cosine, r2);
-  }
-  void point_connection(const PointEmitter& emitter, const T& r2) {
-    target.point_connection(emitter, r2);
-  }
-};
-
 template <int N>
 void store_gradient(const ceres::Jet<double, N>& log_target, int first, Vector& gradient) {
   const int count = std::min<int>(N, static_cast<int>(gradient.size()) - first);
@@ -147,9 +111,10 @@ void differentiate_pass(const Scene& scene, const PathTopology& topology, const 
   const SeededBlocks<N> blocks(chart, first);
   rows.begin_pass(first);
   if (request.gradient && request.constraints) {
-    TargetAndConstraints<T> visitor(rows);
+    using Constraints = ConstraintVisitor<T, JacobianRows>;
+    VisitorPair<T, ContributionVisitor<T>, Constraints> visitor({}, Constraints(rows));
     walk<T>(scene, topology, blocks, visitor);
-    store_gradient(visitor.target.log_target(), first, gradient);
+    store_gradient(visitor.first.log_target(), first, gradient);
   } else if (request.gradient) {
     ContributionVisitor<T> visitor;
     walk<T>(scene, topology, blocks, visitor);
@@ -215,9 +180,10 @@ void constraint_matrix(const Scene& scene, const PathTopology& topology, const C
   accumulate(rows, d, q);
 }
 
-Vector divergence(const Scene& scene, const PathTopology& topology, const Chart& chart,
-                  const Matrix& q) {
+Vector divergence(const Scene& scene, const PathTopology& topology, const Chart& chart) {
   const int d = chart.dimension();
+  Matrix q;
+  constraint_matrix(scene, topology, chart, Vector::Zero(d), q);
   const Eigen::LLT<Matrix> cholesky(q);
   if (cholesky.info() != Eigen::Success)
     return Vector::Constant(d, std::numeric_limits<double>::quiet_NaN());

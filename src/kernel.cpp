@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "driftlight/kernel.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace driftlight {
 namespace {
@@ -16,47 +16,28 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-StepDistribution::StepDistribution(const KernelOptions& options, int dimension,
-                                   const Vector* gradient)
-    : dimension_(dimension), safety_(options.safety), cap_(options.time_step_cap) {
-  log_det_l_ = dimension * std::log(1.0 / 3.0);
-  if (gradient != nullptr) set_drift(options, *gradient, nullptr);
-}
-
-StepDistribution::StepDistribution(const KernelOptions& options, const Matrix& q,
+StepDistribution::StepDistribution(const KernelOptions& options, int dimension, Factor factor,
                                    const Vector* gradient, const Vector* divergence_of_inverse)
-    : StepDistribution(options, static_cast<int>(q.rows()), nullptr) {
-  const Eigen::LLT<Matrix> cholesky(q);
-  if (cholesky.info() == Eigen::Success && cholesky.matrixLLT().diagonal().allFinite()) {
-    identity_ = false;
-    l_ = cholesky.matrixLLT();
-    log_det_l_ = l_.diagonal().array().log().sum();
-  }
-  if (gradient != nullptr)
-    set_drift(options, *gradient, identity_ ? nullptr : divergence_of_inverse);
+    : dimension_(dimension),
+      factor_(std::move(factor)),
+      safety_(options.safety),
+      cap_(options.time_step_cap) {
+  log_det_ = std::visit([](const auto& f) { return f.log_det(); }, factor_);
+  if (gradient != nullptr) set_drift(options, *gradient, divergence_of_inverse);
 }
 
-/// L^-1 x
-Vector StepDistribution::solve_lower(const Vector& x) const {
-  if (identity_) return 3.0 * x;
-  return l_.triangularView<Eigen::Lower>().solve(x);
-}
-
-/// L^-T x
-Vector StepDistribution::solve_upper(const Vector& x) const {
-  if (identity_) return 3.0 * x;
-  return l_.triangularView<Eigen::Lower>().transpose().solve(x);
-}
-
+/// With y = F^-T grad U:  T T* grad U = c^2 F^-1 y. |T* a|^2 = c^2 |F^-T a|^2.
 void StepDistribution::set_drift(const KernelOptions& options, const Vector& gradient,
                                  const Vector* divergence_of_inverse) {
-  a_ = -kC2 * solve_upper(solve_lower(gradient));
+  std::visit([&](const auto& f) { a_ = -kC2 * f.solve(f.solve_transposed(gradient)); }, factor_);
   if (divergence_of_inverse != nullptr && divergence_of_inverse->allFinite())
     a_ += kC2 * *divergence_of_inverse;
   const double a2 = a_.squaredNorm();
   has_drift_ = a2 > 0.0 && std::isfinite(a2);
   if (!has_drift_) return;
-  const double ta2 = kC2 * solve_lower(a_).squaredNorm();
+  const double ta2 =
+      kC2 *
+      std::visit([&](const auto& f) { return f.solve_transposed(a_).squaredNorm(); }, factor_);
   ratio_limit_ = 2.0 * ta2 / (a2 * a2);
   const double slope = std::abs(a_.dot(gradient));
   slope_limit_ = slope > 0.0 ? options.epsilon / slope : kInfinity;
@@ -78,7 +59,7 @@ Vector StepDistribution::sample(double scale, Rng& rng) const {
   Vector xi(dimension_);
   for (int i = 0; i < dimension_; ++i) xi[i] = rng.normal();
   const double size = scale * std::sqrt(2.0 * time_step(scale) * kC2);
-  Vector delta = size * solve_upper(xi);
+  Vector delta = size * std::visit([&](const auto& f) { return f.solve(xi); }, factor_);
   if (has_drift_) delta += mean(scale);
   return delta;
 }
@@ -88,9 +69,8 @@ double StepDistribution::log_density(const Vector& delta, double scale) const {
   Vector r = delta;
   if (has_drift_) r -= mean(scale);
   const double quadratic =
-      identity_ ? r.squaredNorm() / 9.0
-                : (l_.triangularView<Eigen::Lower>().transpose() * r).eval().squaredNorm();
-  return log_det_l_ - 0.5 * (quadratic / variance + dimension_ * (kLogTwoPi + std::log(variance)));
+      std::visit([&](const auto& f) { return f.apply(r).squaredNorm(); }, factor_);
+  return log_det_ - 0.5 * (quadratic / variance + dimension_ * (kLogTwoPi + std::log(variance)));
 }
 
 double draw_scale(const KernelOptions& options, Rng& rng) {

@@ -92,6 +92,7 @@ void check(const std::vector<OptionEntry>& entries) {
 std::vector<OptionEntry> entries(LangevinOptions& options) {
   constexpr std::array<std::string_view, 3> kDrifts{"none", "gradient", "full"};
   constexpr std::array<std::string_view, 2> kPreconditioners{"identity", "constraints"};
+  constexpr std::array<std::string_view, 2> kMethods{"jet", "hand"};
   const Range<double> positive{.low = 0, .open = true};
   KernelOptions& kernel = options.kernel;
   return {
@@ -99,6 +100,8 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
              "drift of a small step: Brownian, -T T* grad U, or that + div(T T*)"),
       choice("preconditioner", kernel.preconditioner, kPreconditioners,
              "step matrix: the same in all directions, or from the path's constraints"),
+      choice("derivatives", kernel.derivatives, kMethods,
+             "automatic or hand-derived derivatives; the same to rounding"),
       number("epsilon", kernel.epsilon, positive, "bound of dt |(a, grad U)|"),
       number("safety", kernel.safety, positive, "divisor of the time step"),
       number("time_step_cap", kernel.time_step_cap, positive, "largest time step"),

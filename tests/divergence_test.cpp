@@ -94,7 +94,7 @@ TEST(Divergence, EqualsNestedJetsInEveryClass) {
       const Chart chart(test.scene, path.topology, path.coordinates);
       PathDerivatives derivatives;
       differentiate(test.scene, path.topology, chart, {false, true}, derivatives);
-      const Vector numeric = divergence(test.scene, path.topology, chart, derivatives.q);
+      const Vector numeric = divergence(test.scene, path.topology, chart);
       const Vector exact = exact_divergence(test.scene, path, chart);
       const Matrix q = derivatives.q.selfadjointView<Eigen::Lower>();
       const Vector difference = numeric - exact;

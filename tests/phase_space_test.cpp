@@ -197,7 +197,8 @@ TEST(Trace, IsReversible) {
       differentiate(test.scene, path.topology, chart, {false, true}, derivatives);
       KernelOptions options;
       options.drift = Drift::None;
-      const StepDistribution step(options, derivatives.q, nullptr, nullptr);
+      const StepDistribution step(options, chart.dimension(),
+                                  CholeskyFactor::of(derivatives.q).value(), nullptr, nullptr);
       const PathCoordinates to = chart.retract(step.sample(1.0, rng));
       PathTopology topology;
       if (trace(test.scene, path.topology, to, topology) != TraceStatus::Ok) continue;

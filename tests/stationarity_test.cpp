@@ -30,7 +30,8 @@ std::string name(Drift drift) {
 
 StepDistribution step_of(const KernelOptions& options, const Matrix& q, const Vector& gradient,
                          const Vector& divergence_of_inverse) {
-  return {options, q, options.drift == Drift::None ? nullptr : &gradient,
+  return {options, static_cast<int>(q.rows()), CholeskyFactor::of(q).value(),
+          options.drift == Drift::None ? nullptr : &gradient,
           options.drift == Drift::Full ? &divergence_of_inverse : nullptr};
 }
 

@@ -56,6 +56,10 @@ class EnvironmentMap {
     return c;
   }
 
+  /// Derivatives of `eval` by the world coordinates of d: a row for each colour. Only their
+  /// components normal to d have a meaning.
+  Eigen::Matrix3d gradient(const Vec3d& d) const;
+
   /// Draws a direction about in proportion to luminance; u1, u2 in [0, 1).
   Vec3d sample(double u1, double u2) const;
   /// Density of `sample` per solid angle; positive wherever `eval` is.

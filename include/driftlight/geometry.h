@@ -130,7 +130,9 @@ Interaction<T> interact_shape(const TriangleMesh& mesh, std::uint32_t primitive,
   return at;
 }
 
-/// |o + t d - c|^2 = r^2:  t = -b -+ sqrt(b^2 - (|o - c|^2 - r^2)),  b = (o - c).d
+/// |o + t d - c|^2 = r^2:  t = -b -+ sqrt(r^2 - |l|^2),  b = (o - c).d,  l = o - c - b d, the nearest
+/// point of the line to the centre: r^2 - |l|^2 keeps its digits where b^2 - (|o - c|^2 - r^2) loses
+/// them (Haines et al., Ray Tracing Gems, ch. 7).
 template <Scalar T>
 Interaction<T> interact_shape(const Sphere& sphere, std::uint32_t primitive, const Ray<T>& ray,
                               bool want_uv) {
@@ -140,7 +142,8 @@ Interaction<T> interact_shape(const Sphere& sphere, std::uint32_t primitive, con
   const Vec3<T> oc = {ray.origin.x() - sphere.center.x(), ray.origin.y() - sphere.center.y(),
                       ray.origin.z() - sphere.center.z()};
   const T b = dot(oc, ray.direction);
-  const T root = sqrt(b * b - (dot(oc, oc) - sphere.radius * sphere.radius));
+  const Vec3<T> l = along(oc, T(-b), ray.direction);
+  const T root = sqrt(sphere.radius * sphere.radius - dot(l, l));
   const T t = primitive == 0 ? T(-b - root) : T(root - b);
   const Vec3<T> n = normalized(along(oc, t, ray.direction));
   Interaction<T> at;

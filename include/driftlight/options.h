@@ -24,10 +24,17 @@ enum class PreconditionerKind {
   Constraints,  ///< Q of the path's constraints (E63.13)
 };
 
+/// How derivatives of a path are found; the results agree to rounding.
+enum class DerivativeMethod {
+  Jet,   ///< automatically, from the contribution's one template
+  Hand,  ///< by formulas derived by hand
+};
+
 /// A small step of the Langevin kernel (E63.3, 8, 9).
 struct KernelOptions {
   Drift drift = Drift::Gradient;
   PreconditionerKind preconditioner = PreconditionerKind::Constraints;
+  DerivativeMethod derivatives = DerivativeMethod::Hand;
   /// Of (E63.8): dt |(a, grad U)| <= epsilon.
   double epsilon = 10;
   /// dt is divided by it.

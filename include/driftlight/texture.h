@@ -24,35 +24,50 @@ struct Bitmap {
 
 enum class Wrap { Repeat, Clamp };
 
-/// Bilinear interpolation between texel centres at pixel coordinates (x, y), where texel (i, j)
-/// has its centre at (i + 1/2, j + 1/2). The bitmap is an opaque function of doubles; a Jet crosses
-/// it by the chain rule, with the exact slopes of the bilinear patch. The derivative jumps between
-/// patches.
+/// The bilinear patch between the four texel centres around pixel coordinates (x, y), where texel
+/// (i, j) has its centre at (i + 1/2, j + 1/2):
+///   c(x, y) = c00 + fx (c10 - c00) + fy (c01 - c00) + fx fy (c00 - c10 - c01 + c11),
+/// fx, fy in [0, 1) from the first centre.
+struct BilinearPatch {
+  Rgbd c00, c10, c01, c11;
+  double x0, y0;  ///< the first texel centre
+
+  BilinearPatch(const Bitmap& bitmap, double x, double y, Wrap wrap_x, Wrap wrap_y) {
+    const auto wrap = [](int i, int n, Wrap mode) {
+      if (mode == Wrap::Clamp) return std::min(std::max(i, 0), n - 1);
+      const int r = i % n;
+      return r < 0 ? r + n : r;
+    };
+    const double left_texel = std::floor(x - 0.5);
+    const double top_texel = std::floor(y - 0.5);
+    const int left = wrap(static_cast<int>(left_texel), bitmap.width, wrap_x);
+    const int right = wrap(static_cast<int>(left_texel) + 1, bitmap.width, wrap_x);
+    const int top = wrap(static_cast<int>(top_texel), bitmap.height, wrap_y);
+    const int bottom = wrap(static_cast<int>(top_texel) + 1, bitmap.height, wrap_y);
+    c00 = bitmap.at(left, top).cast<double>();
+    c10 = bitmap.at(right, top).cast<double>();
+    c01 = bitmap.at(left, bottom).cast<double>();
+    c11 = bitmap.at(right, bottom).cast<double>();
+    x0 = left_texel + 0.5;
+    y0 = top_texel + 0.5;
+  }
+
+  /// d c / dx and d c / dy at (x, y).
+  Rgbd slope_x(double y) const { return (c10 - c00) + (y - y0) * (c11 - c01 - (c10 - c00)); }
+  Rgbd slope_y(double x) const { return (c01 - c00) + (x - x0) * (c11 - c10 - (c01 - c00)); }
+};
+
+/// Bilinear interpolation. The bitmap is an opaque function of doubles; a Jet crosses it by the
+/// chain rule, with the exact slopes of the bilinear patch. The derivative jumps between patches.
 template <Scalar T>
 Rgb<T> lookup(const Bitmap& bitmap, const T& x, const T& y, Wrap wrap_x, Wrap wrap_y) {
-  const auto wrap = [](int i, int n, Wrap mode) {
-    if (mode == Wrap::Clamp) return std::min(std::max(i, 0), n - 1);
-    const int r = i % n;
-    return r < 0 ? r + n : r;
-  };
-  const double xv = value(x) - 0.5;
-  const double yv = value(y) - 0.5;
-  const double x0 = std::floor(xv);
-  const double y0 = std::floor(yv);
-  const int left = wrap(static_cast<int>(x0), bitmap.width, wrap_x);
-  const int right = wrap(static_cast<int>(x0) + 1, bitmap.width, wrap_x);
-  const int top = wrap(static_cast<int>(y0), bitmap.height, wrap_y);
-  const int bottom = wrap(static_cast<int>(y0) + 1, bitmap.height, wrap_y);
-  const Rgbd c00 = bitmap.at(left, top).cast<double>();
-  const Rgbd c10 = bitmap.at(right, top).cast<double>();
-  const Rgbd c01 = bitmap.at(left, bottom).cast<double>();
-  const Rgbd c11 = bitmap.at(right, bottom).cast<double>();
-  const T fx = x - (x0 + 0.5);
-  const T fy = y - (y0 + 0.5);
+  const BilinearPatch patch(bitmap, value(x), value(y), wrap_x, wrap_y);
+  const T fx = x - patch.x0;
+  const T fy = y - patch.y0;
   Rgb<T> result;
   for (int c = 0; c < 3; ++c) {
-    const T upper = fx * (c10[c] - c00[c]) + c00[c];
-    const T lower = fx * (c11[c] - c01[c]) + c01[c];
+    const T upper = fx * (patch.c10[c] - patch.c00[c]) + patch.c00[c];
+    const T lower = fx * (patch.c11[c] - patch.c01[c]) + patch.c01[c];
     result[c] = upper + fy * (lower - upper);
   }
   return result;
@@ -72,6 +87,12 @@ struct Texture {
   explicit Texture(const Rgbd& constant_color) : color(constant_color) {}
 
   bool is_constant() const { return bitmap == nullptr; }
+  /// Derivatives of `eval` by u and by v.
+  struct Slopes {
+    Rgbd u, v;
+  };
+  Slopes slopes(const Vec2d& uv) const;
+
   /// Largest component that the texture takes anywhere.
   double maximum() const;
   /// Mean colour (over the bitmap).

@@ -35,6 +35,9 @@ struct WalkVisitor {
   void scatter(const ScatterEvent<T>&) {}
   /// Scattering into a determined direction, by a delta lobe.
   void delta(const ScatterEvent<T>&) {}
+  /// The ray that leaves the sensor or a vertex, for a visitor that changes its derivatives (never
+  /// its value). `normal` is the geometric one of the surface left; the optical axis at the sensor.
+  void depart(Ray<T>& /*ray*/, const Vec3<T>& /*normal*/) {}
   /// Scattering into the edge that connects to an emitter point.
   void connect(const ScatterEvent<T>&) {}
   /// The ends. `cosine` is that of the emitter's normal and `r2` the squared length of the edge.
@@ -66,6 +69,7 @@ void walk(const Scene& scene, const PathTopology& topology, const Blocks& blocks
   const PerspectiveCamera& camera = scene.camera();
   Ray<T> ray{constant<T>(camera.origin), blocks(0)};
   visitor.sensor(camera, ray.direction);
+  visitor.depart(ray, constant<T>(camera.forward));
   int next_block = 1;
   for (int k = 0; k < topology.scatter_count; ++k) {
     const PathVertex& vertex = topology.vertices[static_cast<std::size_t>(k)];
@@ -88,6 +92,7 @@ void walk(const Scene& scene, const PathTopology& topology, const Blocks& blocks
         ray.direction = blocks(next_block++);
         visitor.scatter({bsdf, shape, at, wi, ray.direction, vertex.scattering});
       }
+      visitor.depart(ray, at.n_g);
       continue;
     }
     const Emitter& emitter = scene.emitters()[topology.emitter];

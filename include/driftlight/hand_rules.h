@@ -1,0 +1,432 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Derivatives derived by hand: the rules, one for each piece of the contribution.
+///
+/// Differentials of the pieces (d before a symbol), to be checked against bsdf.h, geometry.h,
+/// emitter.h, sensor.h and walk.h line by line. The sweep that chains them is hand_derivatives.h.
+///
+/// Scattering. All BSDFs are isotropic: with c_i = n.wi, c_o = n.wo, m = wi.wo,
+///   d log f_s = f_i dc_i + f_o dc_o + f_m dm + f_u du + f_v dv                           (H1)
+///   dc_i = wi.dn + n.dwi,  dc_o = wo.dn + n.dwo,  dm = wo.dwi + wi.dwo,
+/// and the partials f_. are:
+///   diffuse          log c_o                                f_o = 1 / c_o                (H2)
+///   microfacets      log D(C), C = cos^2 h = (c_i + e c_o)^2 / h2, h2 = 1 + e^2 + 2 e m:
+///     dC = 2 (c_i + e c_o) / h2 (dc_i + e dc_o) - 2 e C / h2 dm                          (H3)
+///     Beckmann  d log D / dC = 1 / (alpha^2 C^2) - 2 / C
+///     GGX       d log D / dC = 2 (1 / alpha^2 - 1) / (C + (1 - C) / alpha^2)             (H4)
+///     Smith     with T = tan^2, dT/dc = -2 / c^3:
+///     GGX       d log G1 / dc = alpha^2 / (c^3 s (1 + s)),  s = sqrt(1 + alpha^2 T)
+///     Beckmann  d log G1 / dc = [num'(a) / num - den'(a) / den] a / (c (1 - c^2))        (H5)
+///   rough metal      F(cos = sqrt(h2) / 2):  dF = F' dm / (2 sqrt(h2))                   (H6)
+///   rough interface  F(|i| / sqrt(h2)), i = 1 + e m, o = m + e:
+///     d(|i| / sqrt(h2)) = sign(i) e (1 - i / h2) / sqrt(h2) dm                           (H7)
+///     transmission adds  d log |i o| / (i + e o)^2 = (e / i + 1 / o - 4 e / (i + e o)) dm (H8)
+///   Fresnel, interface  with t the cosine beyond, k = 2 eta (1 - 1/eta^2) / t:
+///     F' = p k / (eta c + t)^2 + s k / (c + eta t)^2                                     (H9)
+///   Fresnel, metal      with S = a^2 + b^2, dS = 2 c D / S dc, da = c a / S dc           (H10)
+///   Phong            log c_o + log(rho_d / pi + rho_s P(mu)), mu = 2 c_i c_o - m, P' = n P / mu
+///                                                                                        (H11)
+/// Delta lobes:
+///   mirror           dv = 2 c dn + 2 n (wi.dn + n.dwi) - dwi                             (H12)
+///   refraction       v = k n - wi / eta, k = c / eta - s r, r = sqrt(1 - (1 - c^2) / eta^2):
+///                    dv = k dn + n k' dc - dwi / eta,  k' = 1 / eta - s c / (eta^2 r)    (H13)
+/// Geometry, for a ray (x, v) of length t that meets a surface with normal n:
+///   dx' = (I - v n^T / n.v) (dx + t dv)                                                  (H14)
+///   interpolated n = N / |N|, N = n_0 + b_1 e_1 + b_2 e_2:  dn = (I - n n^T) dN / |N|    (H15)
+///   sphere           dn = dx' / R                                                        (H16)
+/// Ends:
+///   camera           log W = -3 log(forward.v):  -3 forward / forward.v . dv             (H17)
+///   connection       w = e / r, e = y - x:  dw = (I - w w^T) de / r, d log r^2 = 2 w.de / r
+///                    log cos_y, cos_y = -n_y.w:  d = -(n_y.dw + w.dn_y) / cos_y          (H18)
+#pragma once
+
+#include <cmath>
+
+#include "driftlight/scene.h"
+
+namespace driftlight {
+
+/// A factor of the contribution and its partials (H1). Lanes 0 to 2 are of the logarithms of its
+/// colour, lane 3 of its log_scale.
+struct FactorPartials {
+  using Lanes = Eigen::Array4d;
+
+  Rgbd color{1, 1, 1};
+  Lanes cos_i = Lanes::Zero();
+  Lanes cos_o = Lanes::Zero();
+  Lanes io = Lanes::Zero();
+  Lanes u = Lanes::Zero();
+  Lanes v = Lanes::Zero();
+};
+
+/// The differential of a surface about a point, for tangent dx: of the shading normal, and of uv.
+struct SurfaceDifferential {
+  /// dn = curvature dx + a1 (c1.dx) + a2 (c2.dx); the last two only if `interpolated`.
+  double curvature = 0;
+  bool interpolated = false;
+  Vec3d a1, a2, c1, c2;
+  /// du = u.dx, dv = v.dx; only if `textured`.
+  bool textured = false;
+  Vec3d u, v;
+
+  Vec3d normal_adjoint(const Vec3d& n_bar) const {
+    Vec3d x_bar = curvature * n_bar;
+    if (interpolated) x_bar += a1.dot(n_bar) * c1 + a2.dot(n_bar) * c2;
+    return x_bar;
+  }
+};
+
+/// The rules (H2) to (H18). A class, so that a test can replace single ones by wrong ones.
+struct HandRules {
+  // ---- Microfacets ----
+
+  /// (H4)
+  static double d_log_d(const Microfacets& m, double cos2) {
+    const double inverse = 1.0 / (m.alpha * m.alpha);
+    if (m.distribution == Distribution::Beckmann) return inverse / (cos2 * cos2) - 2.0 / cos2;
+    return 2.0 * (inverse - 1.0) / (cos2 + (1.0 - cos2) * inverse);
+  }
+
+  /// (H5); odd in the cosine, as log G1 is even.
+  static double d_log_g1(const Microfacets& m, double cosine) {
+    const double cos2 = cosine * cosine;
+    const double tan2 = (1.0 - cos2) / cos2;
+    const double alpha2 = m.alpha * m.alpha;
+    if (m.distribution == Distribution::Ggx) {
+      const double s = std::sqrt(1.0 + alpha2 * tan2);
+      return alpha2 / (cos2 * cosine * s * (1.0 + s));
+    }
+    if (tan2 * alpha2 * 1.6 * 1.6 <= 1.0) return 0.0;
+    const double a = 1.0 / (m.alpha * std::sqrt(tan2));
+    const double num = a * (3.535 + 2.181 * a);
+    const double den = 1.0 + a * (2.276 + 2.577 * a);
+    const double slope = (3.535 + 4.362 * a) / num - (2.276 + 5.154 * a) / den;
+    return slope * a / (cosine * (1.0 - cos2));
+  }
+
+  // ---- Fresnel ----
+
+  struct Fresnel {
+    double value, slope;  ///< of the cosine
+  };
+  /// (H9); slope 0 under total reflection.
+  static Fresnel fresnel(double cosine, double eta) {
+    const double inverse2 = 1.0 / (eta * eta);
+    const double cos_t2 = 1.0 - (1.0 - cosine * cosine) * inverse2;
+    if (cos_t2 <= 0.0) return {1.0, 0.0};
+    const double cos_t = std::sqrt(cos_t2);
+    const double p_sum = 1.0 / (eta * cosine + cos_t);
+    const double s_sum = 1.0 / (cosine + eta * cos_t);
+    const double p = (eta * cosine - cos_t) * p_sum;
+    const double s = (cosine - eta * cos_t) * s_sum;
+    const double k = 2.0 * eta * (1.0 - inverse2) / cos_t;
+    return {0.5 * (p * p + s * s), k * (p * p_sum * p_sum + s * s_sum * s_sum)};
+  }
+
+  struct RgbFresnel {
+    Rgbd value, slope;
+  };
+  /// (H10): with s1 = S + c^2, s2 = 2 a c, p1 = c^2 S + s^4, p2 = s2 s^2 (fresnel.h),
+  ///   ds1 = 4 c a^2 / S,  ds2 = 2 a (1 + c^2 / S),
+  ///   dp1 = 2 c S + 2 c^3 D / S - 4 c s^2,  dp2 = ds2 s^2 - 2 c s2,
+  ///   d[(x - y) / (x + y)] = 2 (y dx - x dy) / (x + y)^2.
+  static RgbFresnel fresnel(double c, const Rgbd& eta_rgb, const Rgbd& k_rgb) {
+    using A = Eigen::Array4d;  // a full vector register; the fourth lane is idle
+    A eta(eta_rgb[0], eta_rgb[1], eta_rgb[2], 1.0);
+    A k(k_rgb[0], k_rgb[1], k_rgb[2], 1.0);
+    const double c2 = c * c;
+    const double sin2 = 1.0 - c2;
+    const A difference = eta * eta - k * k - sin2;
+    const A sum = (difference * difference + 4.0 * eta * eta * k * k).sqrt();
+    const A a = (difference >= 0.0)
+                    .select((0.5 * (sum + difference)).sqrt(),
+                            std::sqrt(2.0) * eta * k / (sum - difference).sqrt());
+    const A inverse = 1.0 / sum;
+    const A s1 = sum + c2;
+    const A s2 = 2.0 * c * a;
+    const A p1 = c2 * sum + sin2 * sin2;
+    const A p2 = s2 * sin2;
+    const A ds1 = 4.0 * c * a * a * inverse;
+    const A ds2 = 2.0 * a * (1.0 + c2 * inverse);
+    const A dp1 = 2.0 * c * (sum + c2 * difference * inverse - 2.0 * sin2);
+    const A dp2 = ds2 * sin2 - 2.0 * c * s2;
+    const A s_sum = 1.0 / (s1 + s2);
+    const A p_sum = 1.0 / (p1 + p2);
+    const A perpendicular = (s1 - s2) * s_sum;
+    const A ratio = (p1 - p2) * p_sum;
+    const A d_perpendicular = 2.0 * (s2 * ds1 - s1 * ds2) * s_sum * s_sum;
+    const A d_ratio = 2.0 * (p2 * dp1 - p1 * dp2) * p_sum * p_sum;
+    const A value = 0.5 * perpendicular * (1.0 + ratio);
+    const A slope = 0.5 * (d_perpendicular * (1.0 + ratio) + perpendicular * d_ratio);
+    return {value.head<3>(), slope.head<3>()};
+  }
+
+  // ---- BSDFs ----
+
+  /// d log x = dx / x; 0 where x = 0: a colour without light in a channel has no share in f.
+  static Rgbd log_slope(const Rgbd& slope, const Rgbd& x) {
+    return (x != 0.0).select(slope / x, 0.0);
+  }
+
+  static void add_texture(const Texture& texture, const Vec2d& uv, FactorPartials& f) {
+    const Rgbd color = texture.eval(uv);
+    f.color *= color;
+    if (texture.is_constant()) return;
+    const Texture::Slopes slopes = texture.slopes(uv);
+    f.u.head<3>() += log_slope(slopes.u, color);
+    f.v.head<3>() += log_slope(slopes.v, color);
+  }
+
+  /// D and G: (H3) to (H5), into the lane of log_scale; e is 1 for reflection.
+  static void add_microfacets(const Microfacets& m, double e, double cos_i, double cos_o, double io,
+                              FactorPartials& f) {
+    const double h2 = 1.0 + e * e + 2.0 * e * io;
+    const double root = cos_i + e * cos_o;
+    const double cos2 = root * root / h2;
+    const double d_cos2 = d_log_d(m, cos2);
+    f.cos_i[3] += d_cos2 * 2.0 * root / h2 + d_log_g1(m, cos_i) - 1.0 / cos_i;
+    f.cos_o[3] += d_cos2 * 2.0 * root * e / h2 + d_log_g1(m, cos_o);
+    f.io[3] -= d_cos2 * 2.0 * e * cos2 / h2;
+  }
+
+  static FactorPartials scatter(const Diffuse& b, double, double cos_o, double, const Vec2d& uv,
+                                Scattering) {
+    FactorPartials f;
+    f.cos_o[3] = 1.0 / cos_o;
+    add_texture(b.reflectance, uv, f);
+    return f;
+  }
+
+  static FactorPartials scatter(const RoughConductor& b, double cos_i, double cos_o, double io,
+                                const Vec2d& uv, Scattering) {
+    FactorPartials f;
+    add_microfacets(b.microfacets, 1.0, cos_i, cos_o, io, f);
+    const double h = std::sqrt(2.0 + 2.0 * io);
+    const RgbFresnel metal = fresnel(0.5 * h, b.eta, b.k);
+    f.color = metal.value;
+    f.io.head<3>() = log_slope(metal.slope, metal.value) * (0.5 / h);
+    add_texture(b.specular_reflectance, uv, f);
+    return f;
+  }
+
+  static FactorPartials scatter(const RoughDielectric& b, double cos_i, double cos_o, double io,
+                                const Vec2d& uv, Scattering scattering) {
+    FactorPartials f;
+    const bool reflection = scattering == Scattering::Reflection;
+    const double eta = cos_i > 0.0 ? b.eta : 1.0 / b.eta;
+    const double e = reflection ? 1.0 : eta;
+    add_microfacets(b.microfacets, e, cos_i, cos_o, io, f);
+    const double h2 = 1.0 + e * e + 2.0 * e * io;
+    const double i = 1.0 + e * io;
+    const double o = io + e;
+    const double h = std::sqrt(h2);
+    const Fresnel glass = fresnel(std::abs(i) / h, eta);
+    const double d_cosine = std::copysign(e, i) * (1.0 - i / h2) / h;
+    if (reflection) {
+      f.io[3] += glass.slope / glass.value * d_cosine;
+      add_texture(b.specular_reflectance, uv, f);
+    } else {
+      f.io[3] -= glass.slope / (1.0 - glass.value) * d_cosine;
+      f.io[3] += e / i + 1.0 / o - 4.0 * e / (i + e * o);
+      add_texture(b.specular_transmittance, uv, f);
+    }
+    return f;
+  }
+
+  /// (H11)
+  static FactorPartials scatter(const Phong& b, double cos_i, double cos_o, double io,
+                                const Vec2d& uv, Scattering) {
+    FactorPartials f;
+    f.cos_o[3] = 1.0 / cos_o;
+    const double mu = 2.0 * cos_i * cos_o - io;
+    const double lobe = detail::phong_lobe(b, mu);
+    const Rgbd specular = b.specular_reflectance.eval(uv);
+    f.color = b.diffuse_reflectance.eval(uv) * kInvPi + specular * lobe;
+    if (lobe > 0.0) {
+      const Rgbd d_mu = log_slope(specular * (b.exponent * lobe / mu), f.color);
+      f.cos_i.head<3>() = 2.0 * cos_o * d_mu;
+      f.cos_o.head<3>() = 2.0 * cos_i * d_mu;
+      f.io.head<3>() = -d_mu;
+    }
+    const Texture::Slopes d = b.diffuse_reflectance.slopes(uv);
+    const Texture::Slopes s = b.specular_reflectance.slopes(uv);
+    f.u.head<3>() = log_slope(d.u * kInvPi + s.u * lobe, f.color);
+    f.v.head<3>() = log_slope(d.v * kInvPi + s.v * lobe, f.color);
+    return f;
+  }
+
+  /// Delta BSDFs do not scatter into free directions.
+  static FactorPartials scatter(const Conductor&, double, double, double, const Vec2d&,
+                                Scattering) {
+    FactorPartials f;
+    f.color.setZero();
+    return f;
+  }
+  static FactorPartials scatter(const Dielectric&, double, double, double, const Vec2d&,
+                                Scattering) {
+    FactorPartials f;
+    f.color.setZero();
+    return f;
+  }
+
+  static FactorPartials scatter(const Bsdf& bsdf, double cos_i, double cos_o, double io,
+                                const Vec2d& uv, Scattering scattering) {
+    return std::visit([&](const auto& b) { return scatter(b, cos_i, cos_o, io, uv, scattering); },
+                      bsdf);
+  }
+
+  /// Weight of a delta lobe: R or 1 - R, and its texture.
+  static FactorPartials delta(const Bsdf& bsdf, double cos_i, const Vec2d& uv,
+                              Scattering scattering) {
+    FactorPartials f;
+    if (const auto* metal = std::get_if<Conductor>(&bsdf)) {
+      const RgbFresnel r = fresnel(cos_i, metal->eta, metal->k);
+      f.color = r.value;
+      f.cos_i.head<3>() = log_slope(r.slope, r.value);
+      add_texture(metal->specular_reflectance, uv, f);
+      return f;
+    }
+    const auto& glass = std::get<Dielectric>(bsdf);
+    const Fresnel r = fresnel(std::abs(cos_i), cos_i > 0.0 ? glass.eta : 1.0 / glass.eta);
+    const double slope = std::copysign(1.0, cos_i) * r.slope;
+    if (scattering == Scattering::Reflection) {
+      f.cos_i[3] = slope / r.value;
+      add_texture(glass.specular_reflectance, uv, f);
+    } else {
+      f.cos_i[3] = -slope / (1.0 - r.value);
+      add_texture(glass.specular_transmittance, uv, f);
+    }
+    return f;
+  }
+
+  // ---- Directions of delta lobes ----
+
+  /// dv = normal_factor dn + n_factor n (wi.dn + n.dwi) + wi_factor dwi, for (H12) and (H13) alike.
+  struct DeltaMap {
+    double normal_factor, n_factor, wi_factor;
+  };
+  static DeltaMap delta_map(const Bsdf& bsdf, double cos_i, Scattering scattering) {
+    if (scattering == Scattering::Reflection) return {2.0 * cos_i, 2.0, -1.0};
+    const double glass = std::get<Dielectric>(bsdf).eta;
+    const double inverse = cos_i > 0.0 ? 1.0 / glass : glass;
+    const double root = std::sqrt(1.0 - (1.0 - cos_i * cos_i) * inverse * inverse);
+    const double s = cos_i > 0.0 ? 1.0 : -1.0;
+    return {cos_i * inverse - s * root, inverse - s * cos_i * inverse * inverse / root, -inverse};
+  }
+
+  // ---- Geometry ----
+
+  /// n.v of (H14). On a sphere |n.v| = sqrt(R^2 - |l|^2) / R, l = o - c - b v, b = (o - c).v, as in
+  /// geometry.h: near the silhouette n itself is too coarse.
+  static double hit_cosine(const Geometry& geometry, const Vec3d& origin, const Vec3d& v,
+                           const Vec3d& n) {
+    const auto* sphere = std::get_if<Sphere>(&geometry);
+    if (sphere == nullptr) return n.dot(v);
+    const Vec3d oc = origin - sphere->center;
+    const Vec3d l = along(oc, -dot(oc, v), v);
+    const double root = std::sqrt(sphere->radius * sphere->radius - dot(l, l));
+    return std::copysign(root / sphere->radius, n.dot(v));
+  }
+
+  /// The transpose of (I - v n^T / n.v) of (H14), at q; `cosine` is n.v.
+  static Vec3d hit_adjoint(const Vec3d& v, const Vec3d& n, double cosine, const Vec3d& q) {
+    return q - v.dot(q) / cosine * n;
+  }
+
+  /// (H15). `n_s` tells which side the normal was turned to.
+  static SurfaceDifferential surface(const TriangleMesh& mesh, std::uint32_t primitive,
+                                     const Vec3d& p, const Vec3d& n_s, bool textured) {
+    SurfaceDifferential result;
+    if (mesh.normals.empty() && !textured) return result;
+    const auto& index = mesh.triangles[primitive];
+    const std::array<Vec3d, 3> corner = corners(mesh, primitive);
+    const Vec3d e1 = corner[1] - corner[0];
+    const Vec3d e2 = corner[2] - corner[0];
+    const Vec3d n = e1.cross(e2);
+    const double inverse = 1.0 / n.squaredNorm();
+    result.c1 = inverse * e2.cross(n);
+    result.c2 = inverse * n.cross(e1);
+    if (!mesh.normals.empty()) {
+      const Vec3d n0 = mesh.normals[index[0]].cast<double>();
+      const Vec3d edge1 = mesh.normals[index[1]].cast<double>() - n0;
+      const Vec3d edge2 = mesh.normals[index[2]].cast<double>() - n0;
+      const Vec3d step = p - corner[0];
+      const Vec3d sum = n0 + result.c1.dot(step) * edge1 + result.c2.dot(step) * edge2;
+      const double scale = 1.0 / sum.dot(n_s);  // +-1 / |N|
+      result.interpolated = true;
+      result.a1 = scale * (edge1 - n_s.dot(edge1) * n_s);
+      result.a2 = scale * (edge2 - n_s.dot(edge2) * n_s);
+    }
+    if (textured) {
+      result.textured = true;
+      result.u = result.c1;
+      result.v = result.c2;
+      if (!mesh.uvs.empty()) {
+        const Vec2d u0 = mesh.uvs[index[0]].cast<double>();
+        const Vec2d u1 = mesh.uvs[index[1]].cast<double>() - u0;
+        const Vec2d u2 = mesh.uvs[index[2]].cast<double>() - u0;
+        result.u = u1.x() * result.c1 + u2.x() * result.c2;
+        result.v = u1.y() * result.c1 + u2.y() * result.c2;
+      }
+    }
+    return result;
+  }
+
+  /// (H16); u = atan2(Y, X) / (2 pi), v = acos(Z) / pi of the outward normal.
+  static SurfaceDifferential surface(const Sphere& sphere, std::uint32_t, const Vec3d& p,
+                                     const Vec3d& n_s, bool textured) {
+    SurfaceDifferential result;
+    const Vec3d out = (p - sphere.center) / sphere.radius;
+    result.curvature = std::copysign(1.0 / sphere.radius, out.dot(n_s));
+    if (textured) {
+      const Vec3d x = sphere.to_local.row(0);
+      const Vec3d y = sphere.to_local.row(1);
+      const Vec3d z = sphere.to_local.row(2);
+      const double cx = x.dot(out);
+      const double cy = y.dot(out);
+      const double cz = z.dot(out);
+      result.textured = true;
+      result.u = 0.5 * kInvPi / (sphere.radius * (cx * cx + cy * cy)) * (cx * y - cy * x);
+      result.v = -kInvPi / (sphere.radius * std::sqrt(1.0 - cz * cz)) * z;
+    }
+    return result;
+  }
+
+  /// u = |(s, t)|, v = atan2(t, s) / (2 pi).
+  static SurfaceDifferential surface(const Disk& disk, std::uint32_t, const Vec3d& p, const Vec3d&,
+                                     bool textured) {
+    SurfaceDifferential result;
+    if (textured) {
+      const Vec3d n = disk.u.cross(disk.v);
+      const Vec3d cu = disk.v.cross(n) / n.squaredNorm();
+      const Vec3d cv = n.cross(disk.u) / n.squaredNorm();
+      const double s = cu.dot(p - disk.center);
+      const double t = cv.dot(p - disk.center);
+      const double r2 = s * s + t * t;
+      result.textured = true;
+      result.u = (s * cu + t * cv) / std::sqrt(r2);
+      result.v = 0.5 * kInvPi / r2 * (s * cv - t * cu);
+    }
+    return result;
+  }
+
+  // ---- Ends ----
+
+  /// (H17): gradient of log W by v.
+  static Vec3d camera(const PerspectiveCamera& camera, const Vec3d& v) {
+    return -3.0 / camera.cosine(v) * camera.forward;
+  }
+
+  /// (H18): the transpose of (I - w w^T) / r at w_bar, plus the gradient of -log r^2, by e.
+  static Vec3d connection_adjoint(const Vec3d& w, double r, const Vec3d& w_bar) {
+    return (w_bar - (w.dot(w_bar) + 2.0) * w) / r;
+  }
+
+  /// Gradient of log L by the direction, for colour shares of the whole path.
+  static Vec3d environment(const EnvironmentMap& map, const Vec3d& v, const Rgbd& radiance,
+                           const Rgbd& shares) {
+    const Rgbd weights = (radiance != 0.0).select(shares / radiance, 0.0);
+    return map.gradient(v).transpose() * weights.matrix();
+  }
+};
+
+}  // namespace driftlight
