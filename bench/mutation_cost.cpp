@@ -16,7 +16,7 @@
 namespace driftlight {
 namespace {
 
-constexpr int kMaxLength = 6;
+constexpr int kMaxLength = 8;
 constexpr std::size_t kStates = 256;
 
 /// A scene with light-carrying paths of each length, drawn in proportion to their light.
@@ -88,6 +88,7 @@ void derivatives(benchmark::State& bench, const std::string& name,
 
 void factorisation(benchmark::State& bench, const std::string& name) {
   std::map<const ChainState*, Linearization> known;
+  StepDistribution step;
   over_states(bench, name, [&](const Scene& scene, const ChainState& state) {
     Linearization& path = known[&state];
     if (path.stage_count == 0)

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "driftlight/divergence.h"
+
 namespace driftlight {
 
 double log_acceptance(double log_target_from, double log_target_to, double log_pdf_forward,
@@ -19,29 +21,20 @@ void prepare_step(const Scene& scene, const KernelOptions& options, ChainState& 
       .constraints = options.preconditioner == PreconditionerKind::Constraints};
   state.chart = Chart(scene, state.topology, state.coordinates);
   state.has_step = true;
-  const int dimension = state.chart.dimension();
+  state.figures.reset();
   Linearization path;
   linearize(scene, state.topology, state.chart, options.derivatives, request, path);
-  Factor factor = IdentityFactor(dimension);
-  state.finite = path.gradient.allFinite();
-  if (request.constraints) {
-    RiccatiFactor riccati(path);
-    state.finite = state.finite && riccati.status() != RiccatiFactor::Status::NonFinite;
-    if (riccati.status() == RiccatiFactor::Status::Ok) factor = riccati;
-  }
-  if (!state.finite) return;
   std::optional<Vector> div;
-  if (options.drift == Drift::Full && !std::holds_alternative<IdentityFactor>(factor)) {
-    div = divergence(scene, state.topology, state.chart);
+  if (options.drift == Drift::Full && request.constraints) {
+    div = divergence(scene, state.topology, state.chart, options.derivatives);
     if (!div->allFinite()) div.reset();
   }
-  state.step = StepDistribution(options, dimension, std::move(factor),
-                                request.gradient ? &path.gradient : nullptr, div ? &*div : nullptr);
+  state.finite = state.step.assign(options, path, div ? &*div : nullptr);
 }
 
 Chain::Chain(const Scene& scene, const PathSampler& sampler, const LangevinOptions& options,
-             Film& film, const PathSampler::Sample& start, Rng rng)
-    : scene_(scene), sampler_(sampler), options_(options), film_(film), rng_(rng) {
+             Film& film, const PathSampler::Sample& start, Rng rng, StepLayers* layers)
+    : scene_(scene), sampler_(sampler), options_(options), film_(film), rng_(rng), layers_(layers) {
   current().topology = start.topology;
   current().coordinates = start.coordinates;
   current().contribution = contribution(scene, start.topology, start.coordinates);
@@ -54,6 +47,7 @@ void Chain::run(std::uint64_t mutations) {
     const std::optional<double> acceptance = large ? propose_large() : propose_small();
     ++kernel.proposed;
     kernel.accepted += acceptance.value_or(0.0);
+    if (layers_ != nullptr && !large) record_step(acceptance.value_or(0.0));
     const bool moved = resolve(acceptance.value_or(0.0));
     if (acceptance && !moved && !large) ++statistics_.rejections.hastings;
   }
@@ -98,6 +92,7 @@ std::optional<double> Chain::propose_small() {
     return std::nullopt;
   }
   const double scale = draw_scale(options, rng_);
+  scale_ = scale;
   const Vector delta = from.step.sample(scale, rng_);
   if (!delta.allFinite()) {
     ++statistics_.rejections.non_finite;
@@ -151,6 +146,19 @@ bool Chain::evaluate_proposed() {
   else
     ++rejections.non_finite;
   return false;
+}
+
+void Chain::record_step(double acceptance) {
+  ChainState& from = current();
+  const Vec2d film = scene_.camera().film_position(from.coordinates(0));
+  if (!from.finite) {
+    layers_->add(film, acceptance, nullptr, 0.0);
+    return;
+  }
+  if (!from.figures)
+    from.figures =
+        step_figures(scene_, from.topology, from.chart, options_.kernel.derivatives, from.step);
+  layers_->add(film, acceptance, &*from.figures, from.step.time_step(scale_));
 }
 
 bool Chain::resolve(double acceptance) {

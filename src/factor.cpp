@@ -39,105 +39,140 @@ Vector CholeskyFactor::solve_transposed(const Vector& x) const {
 
 namespace {
 
-using Vec4 = Eigen::Vector4d;
-using Mat4 = Eigen::Matrix4d;
-using Mat2 = Eigen::Matrix2d;
-using LocalMatrix = Eigen::Matrix<double, kLocalWidth, kLocalWidth, Eigen::RowMajor>;
+using Row = Eigen::Array4d;  // a row over s, in one register
 
-/// (rows)^T (rows) of one stage; the first six rows and columns are used.
-LocalMatrix local_matrix(const Linearization& path, int stage) {
-  LocalMatrix m = LocalMatrix::Zero();
-  const int end = path.stages[static_cast<std::size_t>(stage)].rows_end;
-  for (int i = path.rows_begin(stage); i < end; ++i) {
-    const LocalRow row = path.rows.row(i);
-    for (int j = 0; j < 6; ++j) m.row(j).array() += row[j] * row;
+double dot(const Row& a, const Row& b) { return (a * b).sum(); }
+
+/// A symmetric matrix over s, by rows.
+struct StateMatrix {
+  std::array<Row, 4> rows;
+
+  static StateMatrix zero() { return {{Row::Zero(), Row::Zero(), Row::Zero(), Row::Zero()}}; }
+  double operator()(int i, int j) const { return rows[static_cast<std::size_t>(i)][j]; }
+  /// += [x0; x1]^T [y0; y1]
+  void add(const Row& x0, const Row& y0, const Row& x1, const Row& y1) {
+    for (int i = 0; i < 4; ++i) rows[static_cast<std::size_t>(i)] += x0[i] * y0 + x1[i] * y1;
   }
-  return m;
-}
+};
+
+/// (rows)^T (rows) of one stage, over (s, u).
+struct StageMatrix {
+  StateMatrix ss = StateMatrix::zero();
+  LocalRow u0 = LocalRow::Zero();  ///< rows of u, over (s, u)
+  LocalRow u1 = LocalRow::Zero();
+
+  StageMatrix(const Linearization& path, int stage) {
+    const int end = path.stages[static_cast<std::size_t>(stage)].rows_end;
+    for (int k = path.rows_begin(stage); k < end; ++k) {
+      const LocalRow row = path.rows.row(k);
+      const Row s = row.head<4>().transpose();
+      for (int i = 0; i < 4; ++i) ss.rows[static_cast<std::size_t>(i)] += row[i] * s;
+      u0 += row[4] * row;
+      u1 += row[5] * row;
+    }
+  }
+};
 
 }  // namespace
 
 RiccatiFactor::RiccatiFactor(const Linearization& path)
     : step_count_(path.stage_count), dimension_(2 * path.block_count) {
-  Mat4 cost = Mat4::Zero();  // P_k
+  StateMatrix cost = StateMatrix::zero();  // P_k
+  double det_product = 1;
   for (int k = step_count_ - 1; k >= 0; --k) {
     const Stage& stage = path.stages[static_cast<std::size_t>(k)];
     Step& step = steps_[static_cast<std::size_t>(k)];
     step.kind = stage.kind;
     step.has_block = stage.has_block;
-    LocalMatrix h = local_matrix(path, k);
-    const bool first = k == 0;
-    if (stage.kind != Stage::Kind::Terminal && !first) {
-      step.position = stage.position;
-      const Eigen::Matrix<double, 2, 4> xi_part = cost.topLeftCorner<2, 2>() * stage.position;
-      h.topLeftCorner<4, 4>() += stage.position.transpose() * xi_part;
-    }
-    if (stage.kind == Stage::Kind::Delta) {
-      step.direction = stage.direction;
-      const Eigen::Matrix<double, 2, 4> mixed = cost.bottomLeftCorner<2, 2>() * stage.position;
-      const Mat4 cross = stage.direction.transpose() * mixed;
-      h.topLeftCorner<4, 4>() +=
-          cross + cross.transpose() +
-          stage.direction.transpose() * (cost.bottomRightCorner<2, 2>() * stage.direction);
+    StageMatrix m(path, k);
+    Row us0 = m.u0.head<4>().transpose();
+    Row us1 = m.u1.head<4>().transpose();
+    if (stage.kind != Stage::Kind::Terminal && k > 0) {
+      step.position = {stage.position.row(0).transpose(), stage.position.row(1).transpose()};
+      const auto& [a0, a1] = step.position;
+      if (stage.kind == Stage::Kind::Delta)
+        step.direction = {stage.direction.row(0).transpose(), stage.direction.row(1).transpose()};
+      // Rows of P [A; 0] or P [A; D].
+      std::array<Row, 4> pe;
+      for (int i = 0; i < 4; ++i) {
+        Row& row = pe[static_cast<std::size_t>(i)];
+        row = cost(i, 0) * a0 + cost(i, 1) * a1;
+        if (stage.kind == Stage::Kind::Delta)
+          row += cost(i, 2) * step.direction.first + cost(i, 3) * step.direction.second;
+      }
+      m.ss.add(a0, pe[0], a1, pe[1]);
+      if (stage.kind == Stage::Kind::Delta) {
+        m.ss.add(step.direction.first, pe[2], step.direction.second, pe[3]);
+      } else {
+        us0 += pe[2];
+        us1 += pe[3];
+      }
     }
     if (!stage.has_block) {
-      cost = h.topLeftCorner<4, 4>();
+      cost = m.ss;
       continue;
     }
-    double a = h(4, 4) + kConstraintFloor;
-    double b = h(5, 4);
-    double c = h(5, 5) + kConstraintFloor;
+    double a = m.u0[4] + kConstraintFloor;
+    double b = m.u1[4];
+    double c = m.u1[5] + kConstraintFloor;
     if (stage.kind == Stage::Kind::Free) {
       a += cost(2, 2);
       b += cost(3, 2);
       c += cost(3, 3);
     }
-    // Lambda = [a b; b c] = R^T R
-    const double det = a * c - b * b;
-    if (!std::isfinite(det)) {
+    // By pivots, as Cholesky does: the inverse of Lambda would lose the digits of tight
+    // constraints.
+    const double inverse_a = 1.0 / a;
+    const double ratio = b * inverse_a;
+    const double rest = c - b * ratio;
+    if (!std::isfinite(a) || !std::isfinite(rest)) {
       status_ = Status::NonFinite;
       return;
     }
-    step.r00 = std::sqrt(a);
-    step.r01 = b / step.r00;
-    const double rest = c - step.r01 * step.r01;
     if (!(a > 0.0 && rest > 0.0)) {
       status_ = Status::Indefinite;
       return;
     }
+    step.r00 = std::sqrt(a);
+    step.inverse00 = 1.0 / step.r00;
+    step.r01 = b * step.inverse00;
     step.r11 = std::sqrt(rest);
-    log_det_ += std::log(step.r00 * step.r11);
-    if (first) return;
-    Eigen::Matrix<double, 2, 4> h_us = h.block<2, 4>(4, 0);
-    if (stage.kind == Stage::Kind::Free) h_us += cost.bottomLeftCorner<2, 2>() * stage.position;
-    Eigen::Matrix<double, 2, 4> half;  // R^-T H_us
-    half.row(0) = h_us.row(0) / step.r00;
-    half.row(1) = (h_us.row(1) - step.r01 * half.row(0)) / step.r11;
-    step.gain.row(1) = half.row(1) / step.r11;
-    step.gain.row(0) = (half.row(0) - step.r01 * step.gain.row(1)) / step.r00;
-    cost = h.topLeftCorner<4, 4>() - half.transpose() * half;
+    step.inverse11 = 1.0 / step.r11;
+    // One logarithm for many blocks, as far as the range of the exponent allows.
+    det_product *= a * rest;
+    if (det_product > 1e200 || det_product < 1e-200) {
+      log_det_ += 0.5 * std::log(det_product);
+      det_product = 1;
+    }
+    if (k == 0) break;
+    us1 -= ratio * us0;
+    const Row scaled0 = inverse_a * us0;
+    step.gain.second = (1.0 / rest) * us1;
+    step.gain.first = scaled0 - ratio * step.gain.second;
+    cost = m.ss;
+    cost.add(us0, -scaled0, us1, -step.gain.second);
   }
+  log_det_ += 0.5 * std::log(det_product);
 }
 
 Vector RiccatiFactor::apply(const Vector& x) const {
   Vector y(dimension_);
-  Vec4 s = Vec4::Zero();
+  Row s = Row::Zero();
   int block = 0;
   for (int k = 0; k < step_count_; ++k) {
     const Step& step = steps_[static_cast<std::size_t>(k)];
-    Eigen::Vector2d u = Eigen::Vector2d::Zero();
+    double u0 = 0;
+    double u1 = 0;
     if (step.has_block) {
-      u = x.segment<2>(2 * block);
-      Eigen::Vector2d v = u;
-      if (k > 0) v += step.gain * s;
-      y[2 * block] = step.r00 * v[0] + step.r01 * v[1];
-      y[2 * block + 1] = step.r11 * v[1];
+      u0 = x[2 * block];
+      u1 = x[2 * block + 1];
+      const double v0 = k > 0 ? u0 + dot(step.gain.first, s) : u0;
+      const double v1 = k > 0 ? u1 + dot(step.gain.second, s) : u1;
+      y[2 * block] = step.r00 * v0 + step.r01 * v1;
+      y[2 * block + 1] = step.r11 * v1;
       ++block;
     }
-    if (step.kind == Stage::Kind::Terminal) break;
-    if (step.kind == Stage::Kind::Delta) u = step.direction * s;
-    if (k > 0) s.head<2>() = (step.position * s).eval();
-    s.tail<2>() = u;
+    s = next_state(step, k, s, u0, u1);
   }
   return y;
 }
@@ -145,24 +180,36 @@ Vector RiccatiFactor::apply(const Vector& x) const {
 /// The same run with u solved for: u_b = R_b^-1 x_b - K_b s.
 Vector RiccatiFactor::solve(const Vector& x) const {
   Vector y(dimension_);
-  Vec4 s = Vec4::Zero();
+  Row s = Row::Zero();
   int block = 0;
   for (int k = 0; k < step_count_; ++k) {
     const Step& step = steps_[static_cast<std::size_t>(k)];
-    Eigen::Vector2d u = Eigen::Vector2d::Zero();
+    double u0 = 0;
+    double u1 = 0;
     if (step.has_block) {
-      u[1] = x[2 * block + 1] / step.r11;
-      u[0] = (x[2 * block] - step.r01 * u[1]) / step.r00;
-      if (k > 0) u -= step.gain * s;
-      y.segment<2>(2 * block) = u;
+      u1 = x[2 * block + 1] * step.inverse11;
+      u0 = (x[2 * block] - step.r01 * u1) * step.inverse00;
+      if (k > 0) {
+        u0 -= dot(step.gain.first, s);
+        u1 -= dot(step.gain.second, s);
+      }
+      y[2 * block] = u0;
+      y[2 * block + 1] = u1;
       ++block;
     }
-    if (step.kind == Stage::Kind::Terminal) break;
-    if (step.kind == Stage::Kind::Delta) u = step.direction * s;
-    if (k > 0) s.head<2>() = (step.position * s).eval();
-    s.tail<2>() = u;
+    s = next_state(step, k, s, u0, u1);
   }
   return y;
+}
+
+Eigen::Array4d RiccatiFactor::next_state(const Step& step, int k, const Row& s, double u0,
+                                         double u1) {
+  if (step.kind == Stage::Kind::Terminal) return s;
+  if (k == 0) return {0.0, 0.0, u0, u1};
+  const double x0 = dot(step.position.first, s);
+  const double x1 = dot(step.position.second, s);
+  if (step.kind == Stage::Kind::Free) return {x0, x1, u0, u1};
+  return {x0, x1, dot(step.direction.first, s), dot(step.direction.second, s)};
 }
 
 /// The adjoint of `solve`, run backward: with lambda the adjoint of s,
@@ -170,20 +217,22 @@ Vector RiccatiFactor::solve(const Vector& x) const {
 ///   lambda <- A^T lambda_xi + D^T lambda_omega                                  (delta)
 Vector RiccatiFactor::solve_transposed(const Vector& x) const {
   Vector y(dimension_);
-  Vec4 lambda = Vec4::Zero();
+  Row lambda = Row::Zero();
   int block = dimension_ / 2;
   for (int k = step_count_ - 1; k >= 0; --k) {
     const Step& step = steps_[static_cast<std::size_t>(k)];
-    Vec4 back = Vec4::Zero();
+    Row back = Row::Zero();
     if (step.kind != Stage::Kind::Terminal && k > 0)
-      back = step.position.transpose() * lambda.head<2>();
-    if (step.kind == Stage::Kind::Delta) back += step.direction.transpose() * lambda.tail<2>();
+      back = lambda[0] * step.position.first + lambda[1] * step.position.second;
+    if (step.kind == Stage::Kind::Delta)
+      back += lambda[2] * step.direction.first + lambda[3] * step.direction.second;
     if (step.has_block) {
       --block;
-      const Eigen::Vector2d v = x.segment<2>(2 * block) + lambda.tail<2>();
-      y[2 * block] = v[0] / step.r00;
-      y[2 * block + 1] = (v[1] - step.r01 * y[2 * block]) / step.r11;
-      if (k > 0) back -= step.gain.transpose() * v;
+      const double v0 = x[2 * block] + lambda[2];
+      const double v1 = x[2 * block + 1] + lambda[3];
+      y[2 * block] = v0 * step.inverse00;
+      y[2 * block + 1] = (v1 - step.r01 * y[2 * block]) * step.inverse11;
+      if (k > 0) back -= v0 * step.gain.first + v1 * step.gain.second;
     }
     lambda = back;
   }

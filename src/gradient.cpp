@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "driftlight/gradient.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
-#include <limits>
 
 #include "driftlight/constraints.h"
 #include "driftlight/contribution.h"
@@ -178,34 +176,6 @@ void constraint_matrix(const Scene& scene, const PathTopology& topology, const C
     walk<T>(scene, topology, blocks, visitor);
   });
   accumulate(rows, d, q);
-}
-
-Vector divergence(const Scene& scene, const PathTopology& topology, const Chart& chart) {
-  const int d = chart.dimension();
-  Matrix q;
-  constraint_matrix(scene, topology, chart, Vector::Zero(d), q);
-  const Eigen::LLT<Matrix> cholesky(q);
-  if (cholesky.info() != Eigen::Success)
-    return Vector::Constant(d, std::numeric_limits<double>::quiet_NaN());
-  const Matrix inverse = cholesky.solve(Matrix::Identity(d, d));
-  Matrix plus;
-  Matrix minus;
-  Vector delta = Vector::Zero(d);
-  Vector sum = Vector::Zero(d);
-  for (int j = 0; j < d; ++j) {
-    // A small part of the width that the constraints leave to this coordinate while the others are
-    // held, 1 / (3 sqrt(Q_jj)): far above rounding, far below curvature. With the others free it is
-    // sqrt(Q^-1_jj) / 3, which can be a hundred times wider: such a step leaves the valley.
-    const double h = 1e-4 * std::min(1.0, 1.0 / (3.0 * std::sqrt(q(j, j))));
-    delta[j] = h;
-    constraint_matrix(scene, topology, chart, delta, plus);
-    delta[j] = -h;
-    constraint_matrix(scene, topology, chart, delta, minus);
-    delta[j] = 0.0;
-    const Matrix slope = (plus - minus) / (2.0 * h);
-    sum += slope.selfadjointView<Eigen::Lower>() * inverse.col(j);
-  }
-  return -(inverse * sum);
 }
 
 }  // namespace driftlight

@@ -81,28 +81,29 @@ void write_pfm(const PendingFile& file, const Image& image) {
   if (!out) fail_to_write(file.target(), "the disk is full or the folder is not writable");
 }
 
+/// Writes `values`, which have the type of the specification.
+void write_oiio(const PendingFile& file, OIIO::ImageSpec spec, const void* values,
+                const std::map<std::string, std::string>& metadata) {
+  // Without a date here some formats store the present one, and no two files are the same.
+  spec.attribute("DateTime", "");
+  for (const auto& [name, text] : metadata) spec.attribute(name, text);
+  const auto output = make_output(file.temporary());
+  if (!output->open(file.temporary().string(), spec))
+    fail_to_write(file.target(), output->geterror());
+  const bool written = output->write_image(spec.format, values);
+  if (!output->close() || !written) fail_to_write(file.target(), output->geterror());
+}
+
 void write_oiio(const PendingFile& file, const Image& image,
                 const std::map<std::string, std::string>& metadata) {
-  const auto output = make_output(file.temporary());
   const bool floats = stores_floats(file.target());
   OIIO::ImageSpec spec(image.width, image.height, 3,
                        floats ? OIIO::TypeDesc::FLOAT : OIIO::TypeDesc::UINT8);
   spec.attribute("oiio:ColorSpace", floats ? "Linear" : "sRGB");
-  // Without a date here some formats store the present one, and no two files are the same.
-  spec.attribute("DateTime", "");
-  for (const auto& [name, text] : metadata) spec.attribute(name, text);
-
-  if (!output->open(file.temporary().string(), spec))
-    fail_to_write(file.target(), output->geterror());
-  bool written = false;
-  if (floats) {
-    written = output->write_image(OIIO::TypeDesc::FLOAT, image.rgb.data());
-  } else {
-    std::vector<std::uint8_t> bytes(image.rgb.size());
-    std::transform(image.rgb.begin(), image.rgb.end(), bytes.begin(), to_srgb8);
-    written = output->write_image(OIIO::TypeDesc::UINT8, bytes.data());
-  }
-  if (!output->close() || !written) fail_to_write(file.target(), output->geterror());
+  if (floats) return write_oiio(file, spec, image.rgb.data(), metadata);
+  std::vector<std::uint8_t> bytes(image.rgb.size());
+  std::transform(image.rgb.begin(), image.rgb.end(), bytes.begin(), to_srgb8);
+  write_oiio(file, spec, bytes.data(), metadata);
 }
 
 }  // namespace
@@ -139,6 +140,18 @@ void write_image(const std::filesystem::path& file, const Image& image,
     write_pfm(pending, image);
   else
     write_oiio(pending, image, metadata);
+  pending.commit();
+}
+
+void write_layers(const std::filesystem::path& file, const Layers& layers,
+                  const std::map<std::string, std::string>& metadata) {
+  if (lower_extension(file) != ".exr")
+    throw InputError(fmt::format("cannot write '{}': layers go into .exr only", file.string()));
+  OIIO::ImageSpec spec(layers.width, layers.height, static_cast<int>(layers.names.size()),
+                       OIIO::TypeDesc::FLOAT);
+  spec.channelnames = layers.names;
+  PendingFile pending(file);
+  write_oiio(pending, spec, layers.values.data(), metadata);
   pending.commit();
 }
 

@@ -16,13 +16,37 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-StepDistribution::StepDistribution(const KernelOptions& options, int dimension, Factor factor,
-                                   const Vector* gradient, const Vector* divergence_of_inverse)
-    : dimension_(dimension),
-      factor_(std::move(factor)),
-      safety_(options.safety),
-      cap_(options.time_step_cap) {
+StepDistribution::StepDistribution(const KernelOptions& options, int dimension,
+                                   const Factor& factor, const Vector* gradient,
+                                   const Vector* divergence_of_inverse)
+    : factor_(factor) {
+  set(options, dimension, gradient, divergence_of_inverse);
+}
+
+bool StepDistribution::assign(const KernelOptions& options, const Linearization& path,
+                              const Vector* divergence_of_inverse) {
+  if (!path.gradient.allFinite()) return false;
+  const int dimension = 2 * path.block_count;
+  bool identity = path.stage_count == 0;
+  if (!identity) {
+    const auto& riccati = factor_.emplace<RiccatiFactor>(path);
+    if (riccati.status() == RiccatiFactor::Status::NonFinite) return false;
+    identity = riccati.status() == RiccatiFactor::Status::Indefinite;
+  }
+  if (identity) factor_ = IdentityFactor(dimension);
+  const bool has_gradient = path.gradient.size() > 0;
+  set(options, dimension, has_gradient ? &path.gradient : nullptr,
+      identity ? nullptr : divergence_of_inverse);
+  return true;
+}
+
+void StepDistribution::set(const KernelOptions& options, int dimension, const Vector* gradient,
+                           const Vector* divergence_of_inverse) {
+  dimension_ = dimension;
+  safety_ = options.safety;
+  cap_ = options.time_step_cap;
   log_det_ = std::visit([](const auto& f) { return f.log_det(); }, factor_);
+  has_drift_ = false;
   if (gradient != nullptr) set_drift(options, *gradient, divergence_of_inverse);
 }
 

@@ -46,4 +46,46 @@ Matrix constraint_matrix(const Linearization& path) {
   return q;
 }
 
+/// y = J x by a run of the stages forward, J^T y by their adjoints backward.
+Vector apply_constraints(const Linearization& path, const Vector& x) {
+  Eigen::Array<double, kMaxResiduals, 1> residuals;
+  Eigen::Vector4d s = Eigen::Vector4d::Zero();
+  int block = 0;
+  for (int k = 0; k < path.stage_count; ++k) {
+    const Stage& stage = path.stages[static_cast<std::size_t>(k)];
+    Eigen::Vector2d u = Eigen::Vector2d::Zero();
+    if (stage.has_block) u = x.segment<2>(2 * block++);
+    LocalRow local = LocalRow::Zero();
+    local.head<4>() = s.array().transpose();
+    local.segment<2>(4) = u.array().transpose();
+    for (int i = path.rows_begin(k); i < stage.rows_end; ++i)
+      residuals[i] = (path.rows.row(i) * local).sum();
+    if (stage.kind == Stage::Kind::Terminal) break;
+    if (stage.kind == Stage::Kind::Delta) u = stage.direction * s;
+    if (k > 0) s.head<2>() = (stage.position * s).eval();
+    s.tail<2>() = u;
+  }
+
+  Vector y = kConstraintFloor * x;
+  Eigen::Vector4d lambda = Eigen::Vector4d::Zero();
+  for (int k = path.stage_count - 1; k >= 0; --k) {
+    const Stage& stage = path.stages[static_cast<std::size_t>(k)];
+    LocalRow local = LocalRow::Zero();
+    for (int i = path.rows_begin(k); i < stage.rows_end; ++i)
+      local += residuals[i] * path.rows.row(i);
+    Eigen::Vector4d back = local.head<4>().matrix().transpose();
+    if (stage.kind != Stage::Kind::Terminal && k > 0)
+      back += stage.position.transpose() * lambda.head<2>();
+    if (stage.kind == Stage::Kind::Delta) back += stage.direction.transpose() * lambda.tail<2>();
+    if (stage.has_block) {
+      --block;
+      y[2 * block] += local[4];
+      y[2 * block + 1] += local[5];
+      if (stage.kind == Stage::Kind::Free) y.segment<2>(2 * block) += lambda.tail<2>();
+    }
+    lambda = back;
+  }
+  return y;
+}
+
 }  // namespace driftlight

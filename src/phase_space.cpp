@@ -160,6 +160,29 @@ PathCoordinates Chart::retract(const Vector& delta) const {
   return result;
 }
 
+/// On a sphere y = c + R m, m = x / |x|, x = R n + t d0 + b d1:  dy = R (I - m m^T) dx / |x|.
+Chart Chart::displaced(const Vector& delta) const {
+  Chart result = *this;
+  for (int k = 0; k < count_; ++k) {
+    Block& block = result.blocks_[static_cast<std::size_t>(k)];
+    if (delta[2 * k] == 0.0 && delta[2 * k + 1] == 0.0) continue;
+    const Vec3d step = delta[2 * k] * block.t + delta[2 * k + 1] * block.b;
+    if (block.radius == 0.0) {
+      block.point += step;
+      continue;
+    }
+    const Vec3d x = block.radius * block.normal + step;
+    const double length = x.norm();
+    const Vec3d m = x / length;
+    block.point += block.radius * (m - block.normal);
+    block.normal = m;
+    const double scale = block.radius / length;
+    block.t = scale * (block.t - m.dot(block.t) * m);
+    block.b = scale * (block.b - m.dot(block.b) * m);
+  }
+  return result;
+}
+
 std::optional<Chart::Inverse> Chart::inverse(const PathCoordinates& to) const {
   Inverse result;
   result.delta.resize(dimension());

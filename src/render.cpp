@@ -96,7 +96,8 @@ LangevinResult run_langevin(const Scene& scene, const LangevinOptions& options,
   for (const PathSampler::Sample& start : bootstrap.resample(options.chains)) {
     const auto index = static_cast<std::uint64_t>(chains.size());
     chains.push_back(std::make_unique<Chain>(scene, sampler, options, film, start,
-                                             Rng(render.seed, Stream::Chain, index)));
+                                             Rng(render.seed, Stream::Chain, index),
+                                             render.layers));
   }
   LangevinResult result;
   LangevinStatistics& statistics = result.statistics;

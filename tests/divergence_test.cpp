@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Law of the divergence: the differences of divergence() against exact second derivatives, which
-/// jets of jets give.
+/// Laws of the divergence: the differences of divergence() against exact second derivatives, which
+/// Jets of Jets give.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 #include <vector>
 
 #include "driftlight/constraints.h"
+#include "driftlight/divergence.h"
+#include "driftlight/exact_divergence.h"
 #include "driftlight/gradient.h"
-#include "driftlight/kernel.h"
 #include "support/path_classes.h"
 #include "support/test_scenes.h"
 
@@ -21,7 +23,7 @@ namespace {
 using Path = PathSampler::Sample;
 using Dense = Eigen::MatrixXd;
 
-/// Sums 9 (Q - floor) = sum w J^T J as jets: the value and its derivatives over all coordinates.
+/// Sums Q - floor = 1/9 sum w J^T J as jets: the value and its derivatives over all coordinates.
 template <int N>
 class JetMatrix {
  public:
@@ -69,19 +71,14 @@ JetMatrix<N> jet_matrix(const Scene& scene, const Path& path, const Chart& chart
   return matrix;
 }
 
-/// div(Q^-1)_i = sum_j (d_j Q^-1)_ij,  d_j Q^-1 = -Q^-1 (d_j Q) Q^-1
+/// div(Q^-1)_i = sum_j (d_j Q^-1)_ij,  d_j Q^-1 = -Q^-1 (d_j Q) Q^-1, from wide jets and all of dQ.
 template <int N>
-Vector exact_divergence(const Scene& scene, const Path& path, const Chart& chart) {
+Vector plain_divergence(const Scene& scene, const Path& path, const Chart& chart) {
   const JetMatrix<N> q = jet_matrix<N>(scene, path, chart);
   const Dense inverse = q.value().inverse();
   Vector sum = Vector::Zero(chart.dimension());
   for (int j = 0; j < chart.dimension(); ++j) sum += q.derivative(j) * inverse.col(j);
   return -inverse * sum;
-}
-
-Vector exact_divergence(const Scene& scene, const Path& path, const Chart& chart) {
-  if (chart.dimension() <= 6) return exact_divergence<6>(scene, path, chart);
-  return exact_divergence<16>(scene, path, chart);
 }
 
 // Law: divergence() is div(Q^-1) in every class of path. The error is measured in the norm of the
@@ -95,7 +92,7 @@ TEST(Divergence, EqualsNestedJetsInEveryClass) {
       PathDerivatives derivatives;
       differentiate(test.scene, path.topology, chart, {false, true}, derivatives);
       const Vector numeric = divergence(test.scene, path.topology, chart);
-      const Vector exact = exact_divergence(test.scene, path, chart);
+      const Vector exact = exact_divergence(test.scene, path.topology, chart);
       const Matrix q = derivatives.q.selfadjointView<Eigen::Lower>();
       const Vector difference = numeric - exact;
       errors.push_back(std::sqrt(difference.dot(q * difference) / exact.dot(q * exact)));
@@ -110,17 +107,30 @@ TEST(Divergence, EqualsNestedJetsInEveryClass) {
   for (const std::string& missing : classes.missing(3)) ADD_FAILURE() << missing;
 }
 
-// Law: the jets of jets above sum up to the Q that the library computes.
-TEST(Divergence, NestedJetsGiveTheSameMatrix) {
+/// |L^T x|, Q = L L^T
+double norm(const Vector& x, const Matrix& q) { return std::sqrt(x.dot(q * x)); }
+
+// Law: the divergence by blocks of narrow jets is that of wide jets and the whole of dQ, for paths
+// of one block and of several; and those jets sum up to the Q that the library computes.
+TEST(Divergence, BlocksOfNestedJetsEqualWideOnes) {
+  constexpr int kWide = 12;
+  std::array<int, kWide + 1> seen{};
   for (const TestScene& test : test_scenes()) {
-    for (const Path& path : light_paths(test, 50, 42)) {
+    for (const Path& path : light_paths(test, 200, 42)) {
       const Chart chart(test.scene, path.topology, path.coordinates);
+      const int d = chart.dimension();
+      if (d > kWide) continue;
+      ++seen[static_cast<std::size_t>(d)];
       PathDerivatives derivatives;
       differentiate(test.scene, path.topology, chart, {false, true}, derivatives);
       const Matrix q = derivatives.q.selfadjointView<Eigen::Lower>();
-      EXPECT_LT((jet_matrix<16>(test.scene, path, chart).value() - q).norm(), 1e-9 * q.norm());
+      EXPECT_LT((jet_matrix<kWide>(test.scene, path, chart).value() - q).norm(), 1e-9 * q.norm());
+      const Vector plain = plain_divergence<kWide>(test.scene, path, chart);
+      const Vector blocks = exact_divergence(test.scene, path.topology, chart);
+      EXPECT_LT(norm(blocks - plain, q), 1e-6 * norm(plain, q)) << test.name;
     }
   }
+  for (const std::size_t d : {2, 4, 6, 8, 10}) EXPECT_GT(seen[d], 3) << d;
 }
 
 }  // namespace

@@ -8,9 +8,9 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "driftlight/finite_difference.h"
 #include "driftlight/random.h"
 #include "driftlight/warp.h"
-#include "support/finite_difference.h"
 #include "support/test_scenes.h"
 
 namespace driftlight::test {

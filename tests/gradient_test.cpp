@@ -15,7 +15,7 @@
 
 #include "driftlight/constraints.h"
 #include "driftlight/contribution.h"
-#include "support/finite_difference.h"
+#include "driftlight/finite_difference.h"
 #include "support/path_classes.h"
 #include "support/test_scenes.h"
 

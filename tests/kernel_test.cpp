@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "driftlight/chain.h"
+#include "driftlight/divergence.h"
 #include "driftlight/gradient.h"
 #include "support/chi_square.h"
 #include "support/t_test.h"

@@ -6,10 +6,15 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
+#include <filesystem>
 #include <limits>
 #include <vector>
 
+#include "driftlight/bootstrap.h"
+#include "driftlight/chain.h"
 #include "driftlight/factor.h"
+#include "driftlight/scene_file.h"
 #include "support/path_classes.h"
 #include "support/test_scenes.h"
 
@@ -83,6 +88,41 @@ TEST_P(Linearize, PartialRequestsAgreeWithTheFullOne) {
   }
 }
 
+// Law: the stages apply Q to a vector as the dense matrix does.
+TEST_P(Linearize, AppliesQ) {
+  Rng rng(24, Stream::Test, 0);
+  for (const TestScene& test : test_scenes()) {
+    for (const Path& path : light_paths(test, 200, 24)) {
+      const Prepared p(test.scene, path, GetParam());
+      Vector x(p.chart.dimension());
+      for (double& component : x) component = rng.normal();
+      const Vector expected = p.q() * x;
+      EXPECT_LT((apply_constraints(p.local, x) - expected).norm(), 1e-11 * expected.norm());
+    }
+  }
+}
+
+// Law: derivatives at a displaced chart are those over the coordinates of the chart itself.
+TEST_P(Linearize, AtADisplacedChart) {
+  Rng rng(25, Stream::Test, 0);
+  for (const TestScene& test : test_scenes()) {
+    for (const Path& path : light_paths(test, 200, 25)) {
+      const Chart chart(test.scene, path.topology, path.coordinates);
+      Vector delta(chart.dimension());
+      for (double& component : delta) component = 1e-4 * rng.normal();
+      Matrix expected;
+      constraint_matrix(test.scene, path.topology, chart, delta, expected);
+      if (!expected.allFinite()) continue;
+      Linearization local;
+      linearize(test.scene, path.topology, chart.displaced(delta), GetParam(), {false, true},
+                local);
+      const Matrix difference =
+          (constraint_matrix(local) - expected).triangularView<Eigen::Lower>();
+      EXPECT_LT(difference.norm(), 1e-9 * expected.norm());
+    }
+  }
+}
+
 // Law: F^T F = Q, F^-1 and F^-T are its inverses, and log_det is half that of Q.
 TEST_P(Linearize, RiccatiFactorIsARootOfQ) {
   for (const TestScene& test : test_scenes()) {
@@ -146,6 +186,103 @@ TEST(CholeskyFactor, NoneOfAnIndefiniteMatrix) {
     q(1, 1) = bad;
     EXPECT_FALSE(CholeskyFactor::of(q).has_value());
   }
+}
+
+// ---- Chains -----------------------------------------------------------------------------------
+
+/// Two chains that differ in how derivatives are found, and in nothing else.
+class TwinChains {
+ public:
+  TwinChains(const Scene& scene, int max_depth) : scene_(scene), sampler_(scene, max_depth) {
+    jet_.kernel.derivatives = DerivativeMethod::Jet;
+    hand_.kernel.derivatives = DerivativeMethod::Hand;
+    start_ = Bootstrap(sampler_, scene, 20000, 5).resample(1).front();
+  }
+
+  /// Number of mutations before the first one that only one of the two accepts, each chain going
+  /// its own way.
+  int free_run(int mutations) {
+    Chain jet = chain(jet_, start_, 0);
+    Chain hand = chain(hand_, start_, 0);
+    for (int i = 0; i < mutations; ++i)
+      if (moves(jet) != moves(hand)) return i;
+    return mutations;
+  }
+
+  struct Step {
+    bool same = true;     ///< both accept, or neither
+    double distance = 0;  ///< largest between their blocks afterwards
+    bool moved = false;
+  };
+  /// Mutation `index` by both, from the state that the chain by jets has reached.
+  Step step(int index) {
+    Chain jet = chain(jet_, start_, index);
+    Chain hand = chain(hand_, start_, index);
+    Step result;
+    result.moved = moves(jet);
+    result.same = moves(hand) == result.moved;
+    start_.topology = jet.state().topology;
+    start_.coordinates = jet.state().coordinates;
+    for (int k = 0; k < start_.topology.block_count; ++k)
+      result.distance =
+          std::max(result.distance, (start_.coordinates(k) - hand.state().coordinates(k)).norm());
+    return result;
+  }
+
+ private:
+  Chain chain(const LangevinOptions& options, const Path& start, int stream) {
+    return {scene_, sampler_, options,
+            film_,  start,    Rng(6, Stream::Chain, static_cast<std::uint64_t>(stream))};
+  }
+  static bool moves(Chain& chain) {
+    const ChainState* before = &chain.state();
+    chain.run(1);
+    return &chain.state() != before;
+  }
+
+  const Scene& scene_;
+  PathSampler sampler_;
+  LangevinOptions jet_, hand_;
+  Film film_{64, 64};
+  Path start_;
+};
+
+constexpr int kMutations = 100000;
+
+// Law: from one seed, a chain by jets and a chain by hand accept the same mutations.
+TEST(DerivativeMethod, SameChainInTheFurnace) {
+  const Scene scene = furnace(0.5);
+  EXPECT_EQ(TwinChains(scene, 6).free_run(kMutations), kMutations);
+}
+
+/// Law: every mutation of a chain is the same by jets and by hand: decided alike, and into the same
+/// state to rounding. (Left to themselves the two chains part at last: small steps amplify a
+/// difference of rounding by a few per cent each, and only a large step makes them equal again.)
+void expect_same_mutations(const Scene& scene, int max_depth) {
+  TwinChains twins(scene, max_depth);
+  int moved = 0;
+  int decided_otherwise = 0;
+  double distance = 0;
+  for (int i = 0; i < kMutations; ++i) {
+    const TwinChains::Step step = twins.step(i);
+    moved += step.moved ? 1 : 0;
+    decided_otherwise += step.same ? 0 : 1;
+    if (step.same) distance = std::max(distance, step.distance);
+  }
+  EXPECT_EQ(decided_otherwise, 0);
+  EXPECT_LT(distance, 1e-10);
+  EXPECT_GT(moved, kMutations / 10);
+}
+
+TEST(DerivativeMethod, SameMutationsInTheRoom) {
+  expect_same_mutations(test_scenes().front().scene, test_scenes().front().max_depth);
+}
+
+TEST(DerivativeMethod, SameMutationsInTheGlossyScene) {
+  const auto file = std::filesystem::path(DRIFTLIGHT_SCENE_DIR) / "glossy_chain.xml";
+  const LoadedScene loaded = load_scene(file);
+  EXPECT_GT(TwinChains(loaded.scene, 12).free_run(kMutations), 500);
+  expect_same_mutations(loaded.scene, 12);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "driftlight/path_sampler.h"
 #include "driftlight/render.h"
 #include "driftlight/running_mean.h"
+#include "driftlight/step_layers.h"
 
 namespace driftlight {
 
@@ -22,8 +23,9 @@ struct ChainState {
   Contribution contribution;
   Chart chart;
   StepDistribution step;
-  bool has_step = false;  ///< chart and step are computed
-  bool finite = true;     ///< the derivatives behind the step are; else there is none
+  bool has_step = false;               ///< chart and step are computed
+  bool finite = true;                  ///< the derivatives behind the step are; else there is none
+  std::optional<StepFigures> figures;  ///< of the step; only where layers are recorded
   /// log (f / q), the weight of a large step; NaN until it is needed.
   double log_weight = std::numeric_limits<double>::quiet_NaN();
 };
@@ -39,9 +41,9 @@ void prepare_step(const Scene& scene, const KernelOptions& options, ChainState& 
 
 class Chain {
  public:
-  /// Starts at a path that carries light.
+  /// Starts at a path that carries light. Small steps are recorded in `layers` unless it is null.
   Chain(const Scene& scene, const PathSampler& sampler, const LangevinOptions& options, Film& film,
-        const PathSampler::Sample& start, Rng rng);
+        const PathSampler::Sample& start, Rng rng, StepLayers* layers = nullptr);
 
   /// Runs mutations, each splatting both states with weights 1 - a and a.
   void run(std::uint64_t mutations);
@@ -61,6 +63,8 @@ class Chain {
   std::optional<double> propose_small();
   /// Traces and evaluates proposed(); counts why it fails.
   bool evaluate_proposed();
+  /// Counts a small step that starts at current() in the layers.
+  void record_step(double acceptance);
   /// Moves with this probability; true if it moved.
   bool resolve(double acceptance);
 
@@ -72,6 +76,8 @@ class Chain {
   ChainState states_[2];
   std::size_t current_ = 0;
   double gathered_ = 0;  ///< weight of the current state not yet splatted
+  double scale_ = 0;     ///< of the last small step
+  StepLayers* layers_;
   LangevinStatistics statistics_;
   RunningMean weights_;
 };

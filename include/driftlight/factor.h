@@ -45,10 +45,10 @@ class CholeskyFactor {
 };
 
 /// F of the constraints of a path, from its stages (linearization.h) by the Riccati recursion of
-/// linear-quadratic control; Q itself is never formed. With the cost to go of the residuals after
-/// stage k, delta^T Q delta = min over later blocks = s_k^T P_k s_k, and M_k = (rows)^T (rows) of
-/// stage k in the variables (s, u),
-///   H = M_k + E^T P_k E + floor,  E = [A_k 0; 0 I]  (free),   P_{k-1} = H_ss - K^T Lambda K,
+/// linear-quadratic control; Q itself is never formed. With s_k^T P_k s_k the cost to go, the least
+/// that the residuals after stage k add to delta^T Q delta over all later blocks, and M_k =
+/// (rows)^T (rows) of stage k in the variables (s, u),
+///   H = M_k + E^T P_k E + floor,  E = [A_k 0; 0 I]  (free),   P_{k-1} = H_ss - H_su K,
 ///   Lambda = H_uu = R^T R,  K = Lambda^-1 H_us,
 ///   P_{k-1} = M_k + [A_k; D_k]^T P_k [A_k; D_k]     (delta),
 /// and completing squares gives delta^T Q delta = sum_b |R_b (u_b + K_b s)|^2 = |F delta|^2: block
@@ -73,15 +73,23 @@ class RiccatiFactor {
   Vector solve_transposed(const Vector& x) const;
 
  private:
+  /// Two rows over s: a map to R^2.
+  struct Pair {
+    Eigen::Array4d first, second;
+  };
   struct Step {
     Stage::Kind kind;
     bool has_block;
-    /// R = [r00 r01; 0 r11]
-    double r00, r01, r11;
-    Stage::Map gain;  ///< K
-    Stage::Map position;
-    Stage::Map direction;
+    /// R = [r00 r01; 0 r11], and the inverses of its diagonal.
+    double r00, r01, r11, inverse00, inverse11;
+    Pair gain;  ///< K
+    Pair position;
+    Pair direction;
   };
+
+  /// s_k from s_{k-1} and the block u of stage k.
+  static Eigen::Array4d next_state(const Step& step, int k, const Eigen::Array4d& s, double u0,
+                                   double u1);
 
   std::array<Step, kMaxPathLength + 2> steps_;
   int step_count_ = 0;

@@ -130,9 +130,9 @@ Interaction<T> interact_shape(const TriangleMesh& mesh, std::uint32_t primitive,
   return at;
 }
 
-/// |o + t d - c|^2 = r^2:  t = -b -+ sqrt(r^2 - |l|^2),  b = (o - c).d,  l = o - c - b d, the nearest
-/// point of the line to the centre: r^2 - |l|^2 keeps its digits where b^2 - (|o - c|^2 - r^2) loses
-/// them (Haines et al., Ray Tracing Gems, ch. 7).
+/// |o + t d - c|^2 = r^2:  t = -b -+ sqrt(r^2 - |l|^2),  b = (o - c).d,  l = o - c - b d, the
+/// nearest point of the line to the centre: r^2 - |l|^2 keeps its digits where b^2 - (|o - c|^2 -
+/// r^2) loses them (Haines et al., Ray Tracing Gems, ch. 7).
 template <Scalar T>
 Interaction<T> interact_shape(const Sphere& sphere, std::uint32_t primitive, const Ray<T>& ray,
                               bool want_uv) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Derivatives of a path by Jets over all of its coordinates: the plain way, against which the
-/// faster one (linearization.h) is proven, and the divergence of Q^-1.
+/// faster one (linearization.h) is proven.
 #pragma once
 
 #include "driftlight/phase_space.h"
@@ -31,11 +31,6 @@ void differentiate(const Scene& scene, const PathTopology& topology, const Chart
 /// Q at the tangent coordinates `delta` of the same chart, with Jacobians over those coordinates.
 void constraint_matrix(const Scene& scene, const PathTopology& topology, const Chart& chart,
                        const Vector& delta, Matrix& q);
-
-/// div(Q^-1)_i = sum_j d(Q^-1)_ij / d delta_j at the chart's base point: dQ^-1 = -Q^-1 dQ Q^-1 with
-/// dQ by central differences in the chart, 2 d evaluations of Q. Non-finite where a displaced
-/// path does not exist or Q is not positive definite.
-Vector divergence(const Scene& scene, const PathTopology& topology, const Chart& chart);
 
 /// Floor that keeps Q positive definite: pi^-2 on the diagonal (DESIGN 1.5).
 inline constexpr double kConstraintFloor = kInvPi * kInvPi;

@@ -68,6 +68,8 @@ struct Vertex {
   const Shape* shape;
   Vec3d p, n_g, n_s, wi, wo;
   Vec2d uv;
+  double length;      ///< of the edge that arrives
+  double hit_cosine;  ///< n_g . v of that edge
   double cos_i, cos_o, io;
   Scattering scattering;
   bool delta;
@@ -79,6 +81,7 @@ struct Vertex {
 template <class Rules>
 struct Recorder : WalkVisitor<double> {
   const PathTopology& topology;
+  const Vec3d& sensor_origin;
   bool want_gradient;
   std::array<Vertex, kMaxPathLength> vertices;
   int count = 0;
@@ -89,7 +92,13 @@ struct Recorder : WalkVisitor<double> {
   Rgbd radiance{1, 1, 1};    ///< of an environment
   Rgbd color{1, 1, 1};       ///< of the whole path
 
-  Recorder(const PathTopology& of, bool gradient) : topology(of), want_gradient(gradient) {}
+  Recorder(const PathTopology& of, const Vec3d& from, bool gradient)
+      : topology(of), sensor_origin(from), want_gradient(gradient) {}
+
+  /// Where the ray that meets vertex k starts.
+  const Vec3d& origin(int k) const {
+    return k == 0 ? sensor_origin : vertices[static_cast<std::size_t>(k - 1)].p;
+  }
 
   void sensor(const PerspectiveCamera&, const Vec3d& v) { v0 = v; }
   void position(const Shape&, const Vec3d& p) { end = p; }
@@ -124,6 +133,7 @@ struct Recorder : WalkVisitor<double> {
  private:
   Vertex& add(const ScatterEvent<double>& e, bool is_delta) {
     const auto primitive = topology.vertices[static_cast<std::size_t>(count)].hit.primitive;
+    const Vec3d& from = origin(count);
     Vertex& x = vertices[static_cast<std::size_t>(count++)];
     x.bsdf = &e.bsdf;
     x.shape = &e.shape;
@@ -133,6 +143,8 @@ struct Recorder : WalkVisitor<double> {
     x.wi = e.wi;
     x.wo = e.wo;
     x.uv = e.at.uv;
+    x.length = (x.p - from).norm();
+    x.hit_cosine = Rules::hit_cosine(e.shape.geometry, from, Vec3d(-x.wi), x.n_g);
     x.cos_i = e.at.n_s.dot(e.wi);
     x.scattering = e.scattering;
     x.delta = is_delta;
@@ -185,9 +197,8 @@ class Sweep {
       }
       x_bar += x.surface.normal_adjoint(n_bar);
       if (x.surface.textured) x_bar += fold(f.u) * x.surface.u + fold(f.v) * x.surface.v;
-      const Vec3d v = -x.wi;
-      x_bar = Rules::hit_adjoint(v, x.n_g, hit_cosine(*x.shape, k, v, x.n_g), x_bar);
-      v_bar = edge_length(k) * x_bar - w_bar;
+      x_bar = Rules::hit_adjoint(Vec3d(-x.wi), x.n_g, x.hit_cosine, x_bar);
+      v_bar = x.length * x_bar - w_bar;
     }
     store(0, v_bar + Rules::camera(scene_.camera(), path_.v0));
   }
@@ -207,9 +218,7 @@ class Sweep {
     ++block;
     for (int k = 0; k < path_.count; ++k) {
       const Vertex& x = vertex(k);
-      const double length = edge_length(k);
-      const Columns dx = hit(-x.wi, x.n_g, hit_cosine(*x.shape, k, -x.wi, x.n_g), length, xi_t,
-                             xi_b, omega_t, omega_b);
+      const Columns dx = hit(-x.wi, x.n_g, x.hit_cosine, x.length, xi_t, xi_b, omega_t, omega_b);
       Columns dwi = Columns::zero();
       dwi.set(kOmega, -omega_t);
       dwi.set(kOmega + 1, -omega_b);
@@ -250,13 +259,6 @@ class Sweep {
  private:
   const Vertex& vertex(int k) const { return path_.vertices[static_cast<std::size_t>(k)]; }
   bool is_connection(int k) const { return topology_.ends_in_connection() && k + 1 == path_.count; }
-  /// Where the ray that meets vertex k starts.
-  const Vec3d& origin(int k) const { return k == 0 ? scene_.camera().origin : vertex(k - 1).p; }
-  double edge_length(int k) const { return (vertex(k).p - origin(k)).norm(); }
-  double hit_cosine(const Shape& shape, int k, const Vec3d& v, const Vec3d& n) const {
-    return Rules::hit_cosine(shape.geometry, origin(k), v, n);
-  }
-
   // ---- Gradient ----
 
   double fold(const FactorPartials::Lanes& partial) const { return (shares_ * partial).sum(); }
@@ -450,10 +452,11 @@ class Sweep {
     }
     const Hit& hit_at = topology_.vertices[topology_.scatter_count].hit;
     const Shape& shape = scene_.shapes()[hit_at.shape];
-    const double length = (path_.end - origin(path_.count)).norm();
+    const Vec3d& from = path_.origin(path_.count);
+    const double length = (path_.end - from).norm();
     const Vec3d& v = path_.count == 0 ? path_.v0 : vertex(path_.count - 1).wo;
     const Vec3d n = surface_normal(shape.geometry, hit_at.primitive, path_.end);
-    const double cosine = hit_cosine(shape, path_.count, v, n);
+    const double cosine = Rules::hit_cosine(shape.geometry, from, v, n);
     position(shape, hit(v, n, cosine, length, xi_t, xi_b, omega_t, omega_b));
   }
 
@@ -490,7 +493,7 @@ class Sweep {
 template <class Rules>
 void linearize_by_rules(const Scene& scene, const PathTopology& topology, const Chart& chart,
                         const DerivativeRequest& request, Linearization& result) {
-  hand::Recorder<Rules> path(topology, request.gradient);
+  hand::Recorder<Rules> path(topology, scene.camera().origin, request.gradient);
   const auto blocks = [&](int k) -> const Vec3d& { return chart.block(k).point; };
   walk<double>(scene, topology, blocks, path);
   hand::Sweep<Rules> sweep(scene, topology, chart, path, result);

@@ -137,20 +137,21 @@ struct HandRules {
     const double sin2 = 1.0 - c2;
     const A difference = eta * eta - k * k - sin2;
     const A sum = (difference * difference + 4.0 * eta * eta * k * k).sqrt();
-    const A a = (difference >= 0.0)
-                    .select((0.5 * (sum + difference)).sqrt(),
-                            std::sqrt(2.0) * eta * k / (sum - difference).sqrt());
-    const A inverse = 1.0 / sum;
+    // a and b are the roots of (S + D) / 2 and (S - D) / 2 with a b = eta k: the larger by its
+    // root, the other from the product, so that neither cancels.
+    const A larger = (0.5 * (sum + difference.abs())).sqrt();
+    const A a = (difference >= 0.0).select(larger, eta * k / larger);
     const A s1 = sum + c2;
     const A s2 = 2.0 * c * a;
     const A p1 = c2 * sum + sin2 * sin2;
     const A p2 = s2 * sin2;
+    const A inverse = 1.0 / sum;
+    const A s_sum = 1.0 / (s1 + s2);
+    const A p_sum = 1.0 / (p1 + p2);
     const A ds1 = 4.0 * c * a * a * inverse;
     const A ds2 = 2.0 * a * (1.0 + c2 * inverse);
     const A dp1 = 2.0 * c * (sum + c2 * difference * inverse - 2.0 * sin2);
     const A dp2 = ds2 * sin2 - 2.0 * c * s2;
-    const A s_sum = 1.0 / (s1 + s2);
-    const A p_sum = 1.0 / (p1 + p2);
     const A perpendicular = (s1 - s2) * s_sum;
     const A ratio = (p1 - p2) * p_sum;
     const A d_perpendicular = 2.0 * (s2 * ds1 - s1 * ds2) * s_sum * s_sum;

@@ -41,6 +41,19 @@ Image read_image(const std::filesystem::path& file);
 void write_image(const std::filesystem::path& file, const Image& image,
                  const std::map<std::string, std::string>& metadata = {});
 
+/// Named channels of floats, such as diagnostics by pixel.
+struct Layers {
+  int width = 0;
+  int height = 0;
+  std::vector<std::string> names;
+  std::vector<float> values;  ///< rows from the top, at each pixel a value for each name
+};
+
+/// Writes an OpenEXR file with the channels of these names, as `write_image` writes images. Throws
+/// InputError if the file does not end in .exr, RuntimeError if writing fails.
+void write_layers(const std::filesystem::path& file, const Layers& layers,
+                  const std::map<std::string, std::string>& metadata = {});
+
 /// Throws InputError unless `write_image` will know the ending of `file` and its folder exists: to
 /// be asked before a long render.
 void check_writable(const std::filesystem::path& file);

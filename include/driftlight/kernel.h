@@ -20,10 +20,16 @@ class StepDistribution {
   StepDistribution() = default;
 
   /// `gradient` is null for Drift::None, `divergence_of_inverse` = div(Q^-1) is null without it.
-  StepDistribution(const KernelOptions& options, int dimension, Factor factor,
+  StepDistribution(const KernelOptions& options, int dimension, const Factor& factor,
                    const Vector* gradient, const Vector* divergence_of_inverse);
+  /// The same from the constraints of a path, if they can be factorised; else from the identity: a
+  /// function of the state, so that the density stays exact. False if something is not finite; then
+  /// there is no distribution.
+  bool assign(const KernelOptions& options, const Linearization& path,
+              const Vector* divergence_of_inverse);
 
   int dimension() const { return dimension_; }
+  const Factor& factor() const { return factor_; }
   double time_step(double scale) const;
   /// a dt
   Vector mean(double scale) const;
@@ -32,6 +38,9 @@ class StepDistribution {
   double log_density(const Vector& delta, double scale) const;
 
  private:
+  /// All that follows from the factor.
+  void set(const KernelOptions& options, int dimension, const Vector* gradient,
+           const Vector* divergence_of_inverse);
   void set_drift(const KernelOptions& options, const Vector& gradient,
                  const Vector* divergence_of_inverse);
 

@@ -82,4 +82,7 @@ Jacobian jacobian(const Linearization& linearization);
 /// Q = J^T J + floor, dense and symmetric. (d x d)
 Matrix constraint_matrix(const Linearization& linearization);
 
+/// Q x, in O(length). (d)
+Vector apply_constraints(const Linearization& linearization, const Vector& x);
+
 }  // namespace driftlight

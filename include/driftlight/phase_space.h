@@ -77,6 +77,10 @@ class Chart {
 
   PathCoordinates retract(const Vector& delta) const;
 
+  /// The point at `delta` with d retract / d delta there as its tangents, which are not orthogonal
+  /// any more: for derivatives over the coordinates of this chart, not for steps.
+  Chart displaced(const Vector& delta) const;
+
   /// delta with retract(delta) = `to`, and log |d delta / d X| there, in the measure of the phase
   /// space: sum of -3 log cos over sphere blocks (gnomonic projection), DESIGN 1.4. None if a block
   /// lies beyond the horizon of its tangent plane.

@@ -14,6 +14,8 @@
 
 namespace driftlight {
 
+class StepLayers;
+
 struct Progress {
   double fraction = 0;  ///< of the work or of the time, in [0, 1]
   double elapsed = 0;   ///< seconds
@@ -30,6 +32,9 @@ struct RenderOptions {
   std::function<void(const Progress&)> progress;
   /// When it turns true the render ends early and returns what it has.
   const std::atomic<bool>* stop = nullptr;
+  /// Where the Langevin sampler records its small steps, if not null. The image does not depend on
+  /// it, nor on its size.
+  StepLayers* layers = nullptr;
 };
 
 /// Why proposals of the small step were rejected.

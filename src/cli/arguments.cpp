@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -52,6 +53,7 @@ struct Raw {
   std::string threads = "0";
   std::string seed = "0";
   std::string statistics;
+  std::string layers;
   bool verbose = false;
   bool quiet = false;
   bool integrators = false;
@@ -92,6 +94,10 @@ void declare_render(CLI::App& app, Raw& raw) {
       ->type_name("N")
       ->capture_default_str();
   app.add_option("--stats", raw.statistics, "write statistics as JSON")->type_name("FILE");
+  app.add_option("--layers", raw.layers,
+                 "write what the small steps of the langevin integrator do in each pixel: "
+                 "channels gradient_norm, acceptance, anisotropy, time_step, mutations")
+      ->type_name("FILE.exr");
   app.add_flag("-v,--verbose", raw.verbose, "say more at the end");
   app.add_flag("-q,--quiet", raw.quiet, "say nothing but errors");
 }
@@ -137,6 +143,19 @@ void set_work(const Raw& raw, RenderCommand& command) {
     command.samples_per_pixel = parse_number("--spp", *raw.samples_per_pixel, 1);
 }
 
+/// For the langevin integrator, in a format with named channels, and not over an image.
+void set_layers(const Raw& raw, RenderCommand& command) {
+  if (raw.layers.empty()) return;
+  if (command.integrator != Integrator::Langevin)
+    throw UsageError("--layers is for the langevin integrator");
+  const std::filesystem::path file = raw.layers;
+  if (file.extension() != ".exr" && file.extension() != ".EXR")
+    throw UsageError(fmt::format("--layers is '{}': must end in .exr", raw.layers));
+  if (std::find(command.outputs.begin(), command.outputs.end(), file) != command.outputs.end())
+    throw UsageError(fmt::format("--layers is '{}': the image goes there", raw.layers));
+  command.layers = file;
+}
+
 RenderCommand render_command(const Raw& raw) {
   RenderCommand command;
   command.scene = scene_arguments(raw);
@@ -153,6 +172,7 @@ RenderCommand render_command(const Raw& raw) {
   command.threads = parse_number("--threads", raw.threads, 0);
   command.seed = parse_number("--seed", raw.seed, std::uint64_t{0});
   if (!raw.statistics.empty()) command.statistics = raw.statistics;
+  set_layers(raw, command);
   if (raw.verbose && raw.quiet) throw UsageError("give only one of -v and -q");
   if (raw.verbose) command.verbosity = Verbosity::Verbose;
   if (raw.quiet) command.verbosity = Verbosity::Quiet;

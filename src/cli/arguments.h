@@ -41,6 +41,7 @@ struct RenderCommand {
   int threads = 0;
   std::uint64_t seed = 0;
   std::optional<std::filesystem::path> statistics;
+  std::optional<std::filesystem::path> layers;  ///< ends in .exr
   Verbosity verbosity = Verbosity::Normal;
 };
 

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <utility>
 
 #include "cli/commands.h"
@@ -14,6 +15,7 @@
 #include "driftlight/image.h"
 #include "driftlight/render.h"
 #include "driftlight/scene_file.h"
+#include "driftlight/step_layers.h"
 #include "pending_file.h"
 #include "stopwatch.h"
 
@@ -39,6 +41,7 @@ PathResult render_with(const Scene& scene, const PathOptions& options, const Ren
 void check_outputs(const RenderCommand& command) {
   for (const auto& file : command.outputs) check_writable(file);
   if (command.statistics) check_target(*command.statistics);
+  if (command.layers) check_target(*command.layers);
 }
 
 void write_text(const std::filesystem::path& file, const std::string& text) {
@@ -84,12 +87,16 @@ bool apply_settings(const RenderCommand& command, const std::vector<OptionEntry>
   return has_depth;
 }
 
-void write_outputs(const RenderCommand& command, const Image& image, Report& report,
-                   const Talk& talk) {
+void write_outputs(const RenderCommand& command, const Image& image, const StepLayers* layers,
+                   Report& report, const Talk& talk) {
   const Stopwatch watch;
   for (const auto& file : command.outputs) {
     write_image(file, image, report.metadata);
     report.summary.push_back(fmt::format("wrote {}", file.string()));
+  }
+  if (layers != nullptr) {
+    write_layers(*command.layers, layers->develop(), report.metadata);
+    report.summary.push_back(fmt::format("wrote {}", command.layers->string()));
   }
   report.statistics["seconds"]["write"] = watch.seconds();
   if (command.statistics) {
@@ -123,6 +130,11 @@ void render(const RenderCommand& command) {
   how.seed = command.seed;
   how.time = command.time;
   how.stop = &stop_on_interrupt();
+  std::optional<StepLayers> layers;
+  if (command.layers) {
+    const PerspectiveCamera& camera = loaded.scene.camera();
+    how.layers = &layers.emplace(camera.film_width, camera.film_height);
+  }
   const auto result = [&] {
     ProgressBar bar(!talk.quiet());
     how.progress = [&](const Progress& progress) { bar.update(progress); };
@@ -132,7 +144,7 @@ void render(const RenderCommand& command) {
   if (report.empty) throw RuntimeError("stopped before there was an image; nothing is written");
   if (report.stopped) talk.notice("stopped early: the image holds what was rendered so far");
   report.statistics["seconds"]["load"] = load_seconds;
-  write_outputs(command, result.image, report, talk);
+  write_outputs(command, result.image, how.layers, report, talk);
 }
 
 }  // namespace

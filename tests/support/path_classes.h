@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Names for what a path is made of, so that a test can assert that it saw everything.
+/// The classes of paths that tests must see, so that they can assert that they saw everything.
 #pragma once
 
 #include <map>
@@ -12,8 +12,7 @@
 
 namespace driftlight::test {
 
-/// The classes of a path: its BSDFs (with kind of scattering), the surfaces that it meets and the
-/// way in which it ends; see required_classes.
+/// The classes of a sampled path (path_class.h).
 std::set<std::string> classes_of(const Scene& scene, const PathSampler::Sample& path);
 
 /// Every class that the test scenes must produce between them.

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "driftlight/divergence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "driftlight/factor.h"
+
+namespace driftlight {
+
+Vector divergence(const Scene& scene, const PathTopology& topology, const Chart& chart,
+                  DerivativeMethod method) {
+  constexpr DerivativeRequest kConstraints{.gradient = false, .constraints = true};
+  const int d = chart.dimension();
+  Linearization path;
+  linearize(scene, topology, chart, method, kConstraints, path);
+  const RiccatiFactor factor(path);
+  if (factor.status() != RiccatiFactor::Status::Ok)
+    return Vector::Constant(d, std::numeric_limits<double>::quiet_NaN());
+  const Vector diagonal =
+      jacobian(path).colwise().squaredNorm().transpose().array() + kConstraintFloor;
+  Vector delta = Vector::Zero(d);
+  Vector sum = Vector::Zero(d);
+  for (int j = 0; j < d; ++j) {
+    const Vector column = factor.solve(factor.solve_transposed(Vector(Vector::Unit(d, j))));
+    // A small part of the width that the constraints leave to this coordinate while the others are
+    // held, 1 / (3 sqrt(Q_jj)): far above rounding, far below curvature. With the others free it is
+    // sqrt(Q^-1_jj) / 3, which can be a hundred times wider: such a step leaves the valley.
+    const double h = 1e-4 * std::min(1.0, 1.0 / (3.0 * std::sqrt(diagonal[j])));
+    for (const double step : {h, -h}) {
+      delta[j] = step;
+      linearize(scene, topology, chart.displaced(delta), method, kConstraints, path);
+      sum += apply_constraints(path, column) / (2.0 * step);
+    }
+    delta[j] = 0.0;
+  }
+  return -factor.solve(factor.solve_transposed(sum));
+}
+
+}  // namespace driftlight

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "driftlight/path_class.h"
+
+#include <vector>
+
+#include "driftlight/walk.h"
+
+namespace driftlight {
+namespace {
+
+std::string name(const Microfacets& microfacets) {
+  return microfacets.distribution == Distribution::Ggx ? "ggx" : "beckmann";
+}
+
+struct BsdfKind {
+  std::string operator()(const Diffuse&) const { return "diffuse"; }
+  std::string operator()(const Conductor&) const { return "conductor"; }
+  std::string operator()(const RoughConductor& b) const {
+    return "rough conductor " + name(b.microfacets);
+  }
+  std::string operator()(const Dielectric&) const { return "dielectric"; }
+  std::string operator()(const RoughDielectric& b) const {
+    return "rough dielectric " + name(b.microfacets);
+  }
+  std::string operator()(const Phong&) const { return "phong"; }
+};
+
+/// The event of scattering at an interface: which side, and whether it is passed.
+std::string passage(const ScatterEvent<double>& e) {
+  const std::string side = e.at.n_s.dot(e.wi) > 0.0 ? "outside" : "inside";
+  return (e.scattering == Scattering::Reflection ? " reflection " : " transmission ") + side;
+}
+
+std::string lobe(const Phong& b, const ScatterEvent<double>& e) {
+  const double lobe = detail::phong_lobe(b, e.wo.dot(reflect(e.wi, e.at.n_s)));
+  const double specular = luminance(b.specular_reflectance.eval(e.at.uv)) * lobe;
+  const double diffuse = luminance(b.diffuse_reflectance.eval(e.at.uv)) * kInvPi;
+  return specular > diffuse ? " glossy lobe" : " diffuse lobe";
+}
+
+/// The BSDF with what it does at this event.
+std::string lobe(const ScatterEvent<double>& e) {
+  const std::string kind = kind_of(e.bsdf);
+  if (is_transmissive(e.bsdf)) return kind + passage(e);
+  if (const auto* phong = std::get_if<Phong>(&e.bsdf)) return kind + lobe(*phong, e);
+  return kind;
+}
+
+std::string surface(const Shape& shape) {
+  return std::holds_alternative<TriangleMesh>(shape.geometry) ? "mesh" : kind_of(shape);
+}
+
+class Collector : public WalkVisitor<double> {
+ public:
+  explicit Collector(const Scene& scene) : scene_(scene) {}
+
+  const std::set<std::string>& classes() const { return classes_; }
+  /// Scattering events and the end, runs of equal ones collapsed.
+  std::string sequence() const {
+    std::string text;
+    for (std::size_t i = 0; i < events_.size();) {
+      std::size_t run = 1;
+      while (i + run < events_.size() && events_[i + run] == events_[i]) ++run;
+      text += events_[i] + (run > 1 ? " x" + std::to_string(run) : "") + " > ";
+      i += run;
+    }
+    return text + end_;
+  }
+
+  void scatter(const ScatterEvent<double>& e) { add_event(e); }
+  void connect(const ScatterEvent<double>& e) { add_event(e); }
+  void delta(const ScatterEvent<double>& e) { add_event(e); }
+  void hit(const AreaEmitter& emitter, const double&, const double&) {
+    end("hit " + kind_of(scene_.shapes()[emitter.shape]));
+  }
+  void environment(const Emitter& emitter, const Vec3d&) { end(kind_of(emitter)); }
+  void area_connection(const AreaEmitter& emitter, const double&, const double&) {
+    end("connection to " + kind_of(scene_.shapes()[emitter.shape]));
+  }
+  void point_connection(const PointEmitter&, const double&) {
+    end("connection to point");
+    classes_.insert("connection to point after " + last_lobe_);
+  }
+
+ private:
+  void add_event(const ScatterEvent<double>& e) {
+    last_lobe_ = lobe(e);
+    const std::string on = " on " + surface(e.shape);
+    events_.push_back(last_lobe_ + on);
+    classes_.insert(last_lobe_);
+    classes_.insert(on.substr(1));
+    const auto* mesh = std::get_if<TriangleMesh>(&e.shape.geometry);
+    if (mesh != nullptr && !mesh->normals.empty()) classes_.insert("on interpolated normals");
+    if (e.shape.textured) classes_.insert("on texture");
+    const Material& material = scene_.materials()[e.shape.material];
+    if (material.back && &e.bsdf == &scene_.bsdfs()[*material.back]) classes_.insert("on back");
+  }
+  void end(const std::string& what) {
+    end_ = what;
+    classes_.insert(what);
+  }
+
+  const Scene& scene_;
+  std::set<std::string> classes_;
+  std::vector<std::string> events_;
+  std::string last_lobe_;
+  std::string end_;
+};
+
+Collector collect(const Scene& scene, const PathTopology& topology,
+                  const PathCoordinates& coordinates) {
+  Collector collector(scene);
+  walk<double>(scene, topology, coordinates, collector);
+  return collector;
+}
+
+std::string length_class(const PathTopology& topology) {
+  return "length " + std::to_string(topology.length());
+}
+
+}  // namespace
+
+std::string kind_of(const Bsdf& bsdf) { return std::visit(BsdfKind{}, bsdf); }
+
+std::string kind_of(const Shape& shape) {
+  if (std::holds_alternative<Sphere>(shape.geometry)) return "sphere";
+  if (std::holds_alternative<Disk>(shape.geometry)) return "disk";
+  return shape.extent.planar ? "planar mesh" : "mesh";
+}
+
+std::string kind_of(const Emitter& emitter) {
+  if (std::holds_alternative<AreaEmitter>(emitter)) return "area emitter";
+  if (std::holds_alternative<PointEmitter>(emitter)) return "point emitter";
+  return std::holds_alternative<EnvironmentMap>(emitter) ? "environment map"
+                                                         : "constant environment";
+}
+
+std::set<std::string> classes_of(const Scene& scene, const PathTopology& topology,
+                                 const PathCoordinates& coordinates) {
+  std::set<std::string> classes = collect(scene, topology, coordinates).classes();
+  classes.insert(length_class(topology));
+  if (topology.length() == 1) classes.insert("emitter seen directly");
+  return classes;
+}
+
+std::string path_class(const Scene& scene, const PathTopology& topology,
+                       const PathCoordinates& coordinates) {
+  return length_class(topology) + ": " + collect(scene, topology, coordinates).sequence();
+}
+
+}  // namespace driftlight
