@@ -327,14 +327,13 @@ class PathChecker {
       const auto truncation = [&](int j) {
         return Matrix(1.1 * (slope(j, step(j)) - slope(j, 0.25 * step(j))));
       };
-      if ((difference.array() <= spread(inverse, half_gap).array()).all()) {
-        comparison.kinks = 1;
-        return;
-      }
-      if ((difference.array() <= spread(inverse, truncation).array()).all()) {
-        comparison.undecided = 1;
-        return;
-      }
+      const Vector allowed = tolerance(Quantity::Divergence) * scale;
+      const auto explains = [&](const auto& errors) {
+        return (difference.array() <= (allowed + spread(inverse, errors)).array()).all();
+      };
+      comparison.kinks = explains(half_gap) ? 1 : 0;
+      comparison.undecided = comparison.kinks == 0 && explains(truncation) ? 1 : 0;
+      if (comparison.kinks + comparison.undecided > 0) return;
     }
     comparison.compared = 1;
     comparison.error = max_or_infinity(0.0, error);

@@ -110,6 +110,8 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
              "decades over which each step draws its scale; 0: fixed"),
       number("large_step_probability", options.large_step_probability, Range<double>{0, 1},
              "probability of an independent proposal"),
+      choice("large_steps", options.large_steps, std::array<std::string_view, 2>{"path", "bdpt"},
+             "where independent proposals come from: the sensor, or both ends"),
       number("chains", options.chains, Range<int>{1, 1000000},
              "independent chains; the image depends on it, not on the threads"),
       number("bootstrap", options.bootstrap, Range<int>{1, 1000000000},
@@ -120,6 +122,17 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
 
 std::vector<OptionEntry> entries(PathOptions& options) { return {max_depth(options.max_depth)}; }
 
+std::vector<OptionEntry> entries(BdptOptions& options) {
+  constexpr std::array<std::string_view, 2> kHeuristics{"balance", "power"};
+  return {
+      choice("heuristic", options.heuristic, kHeuristics,
+             "how strategies share a path: by their densities, or by the squares of these"),
+      max_depth(options.max_depth),
+  };
+}
+
+std::vector<OptionEntry> entries(LightOptions& options) { return {max_depth(options.max_depth)}; }
+
 void LangevinOptions::validate() const {
   LangevinOptions copy = *this;
   check(entries(copy));
@@ -127,6 +140,16 @@ void LangevinOptions::validate() const {
 
 void PathOptions::validate() const {
   PathOptions copy = *this;
+  check(entries(copy));
+}
+
+void BdptOptions::validate() const {
+  BdptOptions copy = *this;
+  check(entries(copy));
+}
+
+void LightOptions::validate() const {
+  LightOptions copy = *this;
   check(entries(copy));
 }
 

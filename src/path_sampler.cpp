@@ -4,80 +4,226 @@
 #include <cmath>
 #include <limits>
 
+#include "driftlight/walk.h"
+#include "light_part.h"
+#include "path_density.h"
 #include "ray_follower.h"
 
 namespace driftlight {
 namespace {
 
-/// Table entries: length 1 by hit only, then (2, hit), (2, connect), (3, hit), ..
-int entry_of(int length, EndStrategy strategy) {
-  return length == 1 ? 0 : 2 * length - 3 + (strategy == EndStrategy::Connect ? 1 : 0);
-}
-int length_of(int entry) { return (entry + 3) / 2; }
-EndStrategy strategy_of(int entry) {
-  return entry > 0 && entry % 2 == 0 ? EndStrategy::Connect : EndStrategy::Hit;
-}
+using Sample = PathSampler::Sample;
 
-/// Accumulates the density; the factor of the last scattering waits until the end is known.
-class DensityVisitor : public WalkVisitor<double> {
- public:
-  DensityVisitor(const Scene& scene, std::uint32_t emitter, double hit, double connect)
-      : scene_(scene), emitter_(emitter), hit_(hit), connect_(connect) {}
-
-  void sensor(const PerspectiveCamera& camera, const Vec3d& v) {
-    log_density_ = camera.log_importance(v);
-  }
-  void scatter(const ScatterEvent<double>& e) { next(pdf(e.bsdf, e.surface(), e.wi, e.wo), false); }
-  void connect(const ScatterEvent<double>& e) { scatter(e); }
-  void delta(const ScatterEvent<double>& e) {
-    next(delta_probability(e.bsdf, e.surface(), e.wi, e.scattering), true);
-  }
-  void hit(const AreaEmitter& light, const double& cosine, const double& r2) {
-    end(area_pdf(light) * r2 / cosine);
-  }
-  void environment(const Emitter& light, const Vec3d& v) {
-    const auto* map = std::get_if<EnvironmentMap>(&light);
-    end(scene_.emitter_probability(emitter_) * (map != nullptr ? map->pdf(v) : 0.25 * kInvPi));
-  }
-  void area_connection(const AreaEmitter& light, const double& cosine, const double& r2) {
-    last_pdf_ *= cosine / r2;  // of hitting y, per area
-    end(area_pdf(light));
-  }
-  void point_connection(const PointEmitter&, const double&) {
-    last_pdf_ = 0.0;
-    end(scene_.emitter_probability(emitter_));
-  }
-
-  double log_density() const { return log_density_; }
-
- private:
-  void next(double pdf, bool is_delta) {
-    log_density_ += std::log(last_pdf_);
-    last_pdf_ = pdf;
-    can_connect_ = !is_delta;
-  }
-  double area_pdf(const AreaEmitter& light) const {
-    return scene_.emitter_probability(emitter_) / scene_.shapes()[light.shape].extent.area;
-  }
-  void end(double emitter_pdf) {
-    log_density_ += std::log(hit_ * last_pdf_ + (can_connect_ ? connect_ * emitter_pdf : 0.0));
-  }
-
-  const Scene& scene_;
-  std::uint32_t emitter_;
-  double hit_;
-  double connect_;
-  double log_density_ = 0;
-  double last_pdf_ = 1;
-  bool can_connect_ = false;
+/// The part of a path that is drawn from the sensor: `path` holds its vertices, and its free
+/// directions but that of the edge to come.
+struct CameraPart {
+  Sample path;
+  RayFollower follower;            ///< the ray that leaves its last vertex, if that has scattered
+  std::optional<SurfaceHit> last;  ///< the last vertex; none: the sensor
 };
+
+/// Draws v_0 and `surface_vertices` vertices; the last of them scatters only if `scatter_last`.
+std::optional<CameraPart> sample_camera_part(const Scene& scene, int surface_vertices,
+                                             bool scatter_last, Rng& rng) {
+  const Vec3d v = scene.camera().direction(rng.uniform2());
+  CameraPart part{{}, RayFollower(scene, v), std::nullopt};
+  PathTopology& topology = part.path.topology;
+  if (surface_vertices == 0 && !scatter_last) return part;
+  part.path.coordinates(topology.block_count++) = v;
+  for (int k = 1; k <= surface_vertices; ++k) {
+    const Hit hit = part.follower.next_hit();
+    if (!hit.valid()) return std::nullopt;
+    const SurfaceHit surface = part.follower.surface(hit);
+    if (surface.bsdf == nullptr) return std::nullopt;
+    part.last = surface;
+    PathVertex& vertex = topology.vertices[topology.scatter_count++];
+    vertex.hit = hit;
+    vertex.delta = is_delta(*surface.bsdf);
+    if (k == surface_vertices && !scatter_last) return part;
+    const auto next =
+        driftlight::sample(*surface.bsdf, surface.surface(), surface.wi, rng.uniform3());
+    if (!next || !passes(surface.at, surface.wi, next->wo)) return std::nullopt;
+    vertex.scattering = next->scattering;
+    if (!vertex.delta) part.path.coordinates(topology.block_count++) = next->wo;
+    part.follower.leave(surface, next->wo);
+  }
+  return part;
+}
+
+/// s = 0: the ray that leaves the camera part meets an emitter or the environment.
+std::optional<Sample> end_by_hit(const Scene& scene, CameraPart& part) {
+  Sample& path = part.path;
+  PathTopology& topology = path.topology;
+  const Hit hit = part.follower.next_hit();
+  if (!hit.valid()) {
+    if (!scene.environment()) return std::nullopt;
+    topology.end = PathEnd::Environment;
+    topology.emitter = *scene.environment();
+    return path;
+  }
+  const Shape& shape = scene.shapes()[hit.shape];
+  if (!shape.emitter) return std::nullopt;
+  const Interaction<double> at = scene.interact(hit, part.follower.ray());
+  if (at.n_g.dot(part.follower.ray().direction) >= 0.0) return std::nullopt;  // the dark side
+  topology.emitter = *shape.emitter;
+  if (part.last && connects_to_area(*part.last->bsdf, shape)) {
+    topology.end = PathEnd::AreaConnection;
+    path.coordinates(topology.block_count - 1) = at.p;
+  } else {
+    topology.end = PathEnd::Hit;
+    topology.vertices[topology.scatter_count].hit = hit;
+  }
+  return path;
+}
+
+/// s = 1 from a surface: next-event estimation.
+std::optional<Sample> connect_to_emitter(const Scene& scene, CameraPart& part,
+                                         const LightPart& light) {
+  Sample& path = part.path;
+  PathTopology& topology = path.topology;
+  const SurfaceHit& surface = *part.last;
+  PathVertex& vertex = topology.vertices[topology.scatter_count - 1U];
+  topology.emitter = light.emitter;
+  if (vertex.delta) return std::nullopt;
+  const Emitter& emitter = scene.emitters()[light.emitter];
+
+  if (light.infinite) {
+    if (!passes(surface.at, surface.wi, light.sky)) return std::nullopt;
+    const Vec3d start = scene.leave(surface.at.p, surface.at.n_g, light.sky);
+    if (scene.occluded_to_infinity(start, light.sky)) return std::nullopt;
+    vertex.scattering = surface.side(light.sky);
+    topology.end = PathEnd::Environment;
+    path.coordinates(topology.block_count++) = light.sky;
+    return path;
+  }
+
+  const EmitterPoint& y = light.point;
+  const Vec3d edge = y.p - surface.at.p;
+  if (!passes(surface.at, surface.wi, edge)) return std::nullopt;
+  if (connection_status(scene, surface, emitter, y) != TraceStatus::Ok) return std::nullopt;
+  vertex.scattering = surface.side(edge);
+  const auto* area = std::get_if<AreaEmitter>(&emitter);
+  if (area == nullptr) {
+    topology.end = PathEnd::PointConnection;
+  } else if (connects_to_area(*surface.bsdf, scene.shapes()[area->shape])) {
+    topology.end = PathEnd::AreaConnection;
+    path.coordinates(topology.block_count++) = y.p;
+  } else {
+    // The chart of this path is its last direction: find the primitive that it hits.
+    const Vec3d wo = edge.normalized();
+    const Vec3d start = scene.leave(surface.at.p, surface.at.n_g, wo);
+    const Hit hit = scene.intersect(start, wo);
+    if (hit.shape != area->shape) return std::nullopt;
+    topology.end = PathEnd::Hit;
+    topology.vertices[topology.scatter_count].hit = hit;
+    path.coordinates(topology.block_count++) = wo;
+  }
+  return path;
+}
+
+/// Appends the vertices of the light part from the connection on, with their free directions, all
+/// seen from the sensor. False if a pair of directions does not scatter.
+bool append(const LightPart& light, const Vec3d& edge, Sample& path) {
+  PathTopology& topology = path.topology;
+  for (int i = light.count - 1; i >= 0; --i) {
+    const LightPart::Vertex& x = light[i];
+    PathVertex& vertex = topology.vertices[topology.scatter_count++];
+    vertex.hit = x.hit;
+    vertex.delta = x.delta;
+    vertex.scattering = x.scattering;
+    if (i + 1 == light.count) {
+      if (x.delta || !passes(light.last->at, light.last->wi, -edge)) return false;
+      vertex.scattering = light.last->side(-edge);
+    }
+    if (x.delta) continue;
+    Vec3d& v = path.coordinates(topology.block_count++);
+    if (i > 0)
+      v = -light[i - 1].to_sensor;
+    else
+      v = light.infinite ? light.sky : Vec3d((light.point.p - x.p).normalized());
+  }
+  return true;
+}
+
+/// Gives a path of free directions the chart that its end has. False if it has none.
+bool set_end(const Scene& scene, const LightPart& light, Sample& path) {
+  PathTopology& topology = path.topology;
+  topology.emitter = light.emitter;
+  if (light.infinite) {
+    topology.end = PathEnd::Environment;
+    return true;
+  }
+  topology.end = PathEnd::Hit;
+  const auto* area = std::get_if<AreaEmitter>(&scene.emitters()[light.emitter]);
+  if (area == nullptr) {
+    // The light of a point comes straight from it: behind a delta lobe it has no coordinates.
+    if (light.count == 0 || light[0].delta) return false;
+    topology.end = PathEnd::PointConnection;
+    --topology.block_count;
+  } else if (light.count > 0 && connects_to_area(*light[0].bsdf, scene.shapes()[area->shape])) {
+    topology.end = PathEnd::AreaConnection;
+    path.coordinates(topology.block_count - 1) = light.point.p;
+  }
+  return true;
+}
+
+/// Where the vertices of a path lie, from x_1 on.
+struct Positions : WalkVisitor<double> {
+  std::array<Vec3d, kMaxPathLength + 1> points;
+  int count = 0;
+
+  void position(const Shape&, const Vec3d& p) { points[static_cast<std::size_t>(count++)] = p; }
+};
+
+/// True if the last vertices of the path are those of the light part: then nothing stands in the
+/// way of the connection.
+bool contains(const Scene& scene, const Sample& path, const LightPart& light) {
+  Positions positions;
+  walk<double>(scene, path.topology, path.coordinates, positions);
+  int k = positions.count;
+  const double tolerance = 1e-6 * scene.radius();
+  const auto next_is = [&](const Vec3d& p) {
+    return (positions.points[static_cast<std::size_t>(--k)] - p).norm() <= tolerance;
+  };
+  if (!light.infinite && !light.point.n.isZero(0.0) && !next_is(light.point.p)) return false;
+  for (int i = 0; i < light.count; ++i)
+    if (!next_is(light[i].p)) return false;
+  return true;
+}
+
+/// s >= 1 in general. The joined path is traced anew from the sensor, as every state of the chain
+/// is: that finds the primitives that its rays hit, and whatever blocks them.
+std::optional<Sample> connect(const Scene& scene, CameraPart& part, const LightPart& light) {
+  Sample& path = part.path;
+  PathTopology& topology = path.topology;
+  const Vec3d& from = part.last ? part.last->at.p : scene.camera().origin;
+  const Vec3d to = light.count > 0 ? light[light.count - 1].p : light.point.p;
+  const bool to_sky = light.count == 0 && light.infinite;
+  const Vec3d edge = to_sky ? light.sky : Vec3d((to - from).normalized());
+  if (part.last) {
+    if (!passes(part.last->at, part.last->wi, edge)) return std::nullopt;
+    topology.vertices[topology.scatter_count - 1U].scattering = part.last->side(edge);
+  }
+  path.coordinates(topology.block_count++) = edge;
+  if (!append(light, edge, path) || !set_end(scene, light, path)) return std::nullopt;
+  const PathTopology pattern = topology;
+  if (trace(scene, pattern, path.coordinates, topology) != TraceStatus::Ok) return std::nullopt;
+  if (!contains(scene, path, light)) return std::nullopt;
+  return path;
+}
 
 }  // namespace
 
-PathSampler::PathSampler(const Scene& scene, int max_depth)
-    : scene_(scene),
-      max_depth_(max_depth),
-      table_(std::vector<double>(static_cast<std::size_t>(2 * max_depth - 1), 1.0)) {}
+PathSampler::PathSampler(const Scene& scene, int max_depth, LargeSteps large_steps)
+    : scene_(scene), max_depth_(max_depth), first_of_length_{0} {
+  for (int n = 1; n <= max_depth; ++n) {
+    first_of_length_.push_back(entry_count());
+    const int most = large_steps == LargeSteps::Bdpt ? n : std::min(n - 1, 1);
+    for (int s = 0; s <= most; ++s) strategies_.push_back({n, s});
+  }
+  first_of_length_.push_back(entry_count());
+  table_ = DiscreteDistribution(std::vector<double>(strategies_.size(), 1.0));
+}
 
 void PathSampler::learn(const std::vector<RunningMean>& weights) {
   double energy = 0;
@@ -97,124 +243,31 @@ void PathSampler::learn(const std::vector<RunningMean>& weights) {
 
 std::optional<PathSampler::Sample> PathSampler::sample(Rng& rng) const {
   double u = rng.uniform();
-  Sample path;
-  path.entry = table_.sample(u);
-  const int length = length_of(path.entry);
-  const EndStrategy strategy = strategy_of(path.entry);
-
-  const Vec3d v = scene_.camera().direction(rng.uniform2());
-  PathTopology& topology = path.topology;
-  topology.block_count = 1;
-  path.coordinates(0) = v;
-  RayFollower follower(scene_, v);
-  const Bsdf* last_bsdf = nullptr;
-  for (int k = 0; k + 1 < length; ++k) {
-    const Hit hit = follower.next_hit();
-    if (!hit.valid()) return std::nullopt;
-    const SurfaceHit surface = follower.surface(hit);
-    if (surface.bsdf == nullptr) return std::nullopt;
-    last_bsdf = surface.bsdf;
-    PathVertex& vertex = topology.vertices[topology.scatter_count++];
-    vertex.hit = hit;
-    vertex.delta = is_delta(*surface.bsdf);
-    if (strategy == EndStrategy::Connect && k + 2 == length)
-      return connect(std::move(path), surface, rng);
-    const auto next =
-        driftlight::sample(*surface.bsdf, surface.surface(), surface.wi, rng.uniform3());
-    if (!next || !passes(surface.at, surface.wi, next->wo)) return std::nullopt;
-    vertex.scattering = next->scattering;
-    if (!vertex.delta) path.coordinates(topology.block_count++) = next->wo;
-    follower.leave(surface, next->wo);
-  }
-  return end_by_hit(std::move(path), follower, last_bsdf);
-}
-
-std::optional<PathSampler::Sample> PathSampler::end_by_hit(Sample path, RayFollower& follower,
-                                                           const Bsdf* last_bsdf) const {
-  PathTopology& topology = path.topology;
-  const Hit hit = follower.next_hit();
-  if (!hit.valid()) {
-    if (!scene_.environment()) return std::nullopt;
-    topology.end = PathEnd::Environment;
-    topology.emitter = *scene_.environment();
-    return path;
-  }
-  const Shape& shape = scene_.shapes()[hit.shape];
-  if (!shape.emitter) return std::nullopt;
-  const Interaction<double> at = scene_.interact(hit, follower.ray());
-  if (at.n_g.dot(follower.ray().direction) >= 0.0) return std::nullopt;  // the dark side
-  topology.emitter = *shape.emitter;
-  if (last_bsdf != nullptr && connects_to_area(*last_bsdf, shape)) {
-    topology.end = PathEnd::AreaConnection;
-    path.coordinates(topology.block_count - 1) = at.p;
-  } else {
-    topology.end = PathEnd::Hit;
-    topology.vertices[topology.scatter_count].hit = hit;
-  }
-  return path;
-}
-
-std::optional<PathSampler::Sample> PathSampler::connect(Sample path, const SurfaceHit& surface,
-                                                        Rng& rng) const {
-  PathTopology& topology = path.topology;
-  PathVertex& vertex = topology.vertices[topology.scatter_count - 1U];
-  double u = rng.uniform();
-  topology.emitter = scene_.sample_emitter(u);
-  const Vec2d square = rng.uniform2();
-  if (vertex.delta) return std::nullopt;
-  const Emitter& emitter = scene_.emitters()[topology.emitter];
-
-  if (is_environment(emitter)) {
-    const auto* map = std::get_if<EnvironmentMap>(&emitter);
-    const Vec3d wo = map != nullptr ? map->sample(square.x(), square.y())
-                                    : square_to_sphere(square.x(), square.y());
-    if (!passes(surface.at, surface.wi, wo)) return std::nullopt;
-    const Vec3d start = scene_.leave(surface.at.p, surface.at.n_g, wo);
-    if (scene_.occluded_to_infinity(start, wo)) return std::nullopt;
-    vertex.scattering = surface.side(wo);
-    topology.end = PathEnd::Environment;
-    path.coordinates(topology.block_count++) = wo;
-    return path;
-  }
-
-  const auto* light = std::get_if<AreaEmitter>(&emitter);
-  EmitterPoint y;
-  if (light != nullptr)
-    y = scene_.sample_area(*light, square.x(), square.y());
-  else
-    y.p = std::get<PointEmitter>(emitter).position;
-  const Vec3d edge = y.p - surface.at.p;
-  if (!passes(surface.at, surface.wi, edge)) return std::nullopt;
-  if (connection_status(scene_, surface, emitter, y) != TraceStatus::Ok) return std::nullopt;
-  vertex.scattering = surface.side(edge);
-  if (light == nullptr) {
-    topology.end = PathEnd::PointConnection;
-  } else if (connects_to_area(*surface.bsdf, scene_.shapes()[light->shape])) {
-    topology.end = PathEnd::AreaConnection;
-    path.coordinates(topology.block_count++) = y.p;
-  } else {
-    // The chart of this path is its last direction: find the primitive that it hits.
-    const Vec3d wo = edge.normalized();
-    const Vec3d start = scene_.leave(surface.at.p, surface.at.n_g, wo);
-    const Hit hit = scene_.intersect(start, wo);
-    if (hit.shape != light->shape) return std::nullopt;
-    topology.end = PathEnd::Hit;
-    topology.vertices[topology.scatter_count].hit = hit;
-    path.coordinates(topology.block_count++) = wo;
-  }
-  return path;
+  const int entry = table_.sample(u);
+  const auto [n, s] = strategies_[static_cast<std::size_t>(entry)];
+  auto camera = sample_camera_part(scene_, s == 0 ? n - 1 : n - s, s == 0, rng);
+  if (!camera) return std::nullopt;
+  camera->path.entry = entry;
+  if (s == 0) return end_by_hit(scene_, *camera);
+  const bool camera_is_delta = camera->last && is_delta(*camera->last->bsdf);
+  if (camera_is_delta) return std::nullopt;
+  const auto light = sample_light_part(scene_, s - 1, rng);
+  if (!light) return std::nullopt;
+  if (s == 1 && camera->last) return connect_to_emitter(scene_, *camera, *light);
+  return connect(scene_, *camera, *light);
 }
 
 double PathSampler::log_density(const PathTopology& topology,
                                 const PathCoordinates& coordinates) const {
-  const int length = topology.length();
-  if (length > max_depth_) return -std::numeric_limits<double>::infinity();
-  const double hit = table_.probability(entry_of(length, EndStrategy::Hit));
-  const double connect =
-      length > 1 ? table_.probability(entry_of(length, EndStrategy::Connect)) : 0.0;
-  DensityVisitor visitor(scene_, topology.emitter, hit, connect);
-  walk<double>(scene_, topology, coordinates, visitor);
-  return visitor.log_density();
+  const int n = topology.length();
+  if (n > max_depth_) return -std::numeric_limits<double>::infinity();
+  const StrategyDensities q = strategy_densities(scene_, topology, coordinates);
+  const int first = first_of_length_[static_cast<std::size_t>(n)];
+  const int end = first_of_length_[static_cast<std::size_t>(n) + 1];
+  double sum = 0;
+  for (int entry = first; entry < end; ++entry)
+    sum += table_.probability(entry) * q.by_light_vertices[static_cast<std::size_t>(entry - first)];
+  return std::log(sum);
 }
 
 }  // namespace driftlight

@@ -31,6 +31,14 @@ class RayFollower {
         t_min_(scene.camera().near_clip / scene.camera().cosine(v)),
         t_max_(scene.camera().far_clip / scene.camera().cosine(v)) {}
 
+  /// Starts at `origin`; `start` is the origin, moved off the surface that it lies on.
+  RayFollower(const Scene& scene, const Vec3d& origin, const Vec3d& start, const Vec3d& v)
+      : scene_(scene),
+        ray_{origin, v},
+        start_(start),
+        t_min_(0.0),
+        t_max_(std::numeric_limits<double>::infinity()) {}
+
   const Ray<double>& ray() const { return ray_; }
 
   Hit next_hit() {

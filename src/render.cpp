@@ -89,7 +89,7 @@ LangevinResult run_langevin(const Scene& scene, const LangevinOptions& options,
                             const RenderOptions& render, double mutations_per_pixel) {
   const PerspectiveCamera& camera = scene.camera();
   Stopwatch watch;
-  PathSampler sampler(scene, options.max_depth);
+  PathSampler sampler(scene, options.max_depth, options.large_steps);
   const Bootstrap bootstrap(sampler, scene, options.bootstrap, render.seed);
   Film film(camera.film_width, camera.film_height);
   std::vector<std::unique_ptr<Chain>> chains;

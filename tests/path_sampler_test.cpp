@@ -29,23 +29,25 @@ std::string kind(const PathTopology& topology) {
          std::to_string(topology.emitter);
 }
 
+enum class Favourite { Hit, Connect };
+
 /// A sampler whose table prefers one strategy nine times out of ten.
-PathSampler biased_sampler(const TestScene& test, EndStrategy favourite) {
+PathSampler biased_sampler(const TestScene& test, Favourite favourite) {
   PathSampler sampler(test.scene, test.max_depth);
   std::vector<RunningMean> weights(static_cast<std::size_t>(sampler.entry_count()));
   weights[0].add(1.0);
   // Entries: length 1 by hit only, then (2, hit), (2, connect), (3, hit), ..
   for (std::size_t i = 1; i < weights.size(); ++i)
-    if ((i % 2 == 0) == (favourite == EndStrategy::Connect)) weights[i].add(1.0);
+    if ((i % 2 == 0) == (favourite == Favourite::Connect)) weights[i].add(1.0);
   sampler.learn(weights);
   return sampler;
 }
 
 /// Probability of entry i of that table: the favourites share nine tenths, all share the last one.
-double table_probability(const PathSampler& sampler, int entry, EndStrategy favourite) {
+double table_probability(const PathSampler& sampler, int entry, Favourite favourite) {
   const int count = sampler.entry_count();
   const bool connects = entry > 0 && entry % 2 == 0;
-  const bool favoured = entry == 0 || connects == (favourite == EndStrategy::Connect);
+  const bool favoured = entry == 0 || connects == (favourite == Favourite::Connect);
   const int favourites = 1 + (count - 1) / 2;
   return (favoured ? 0.9 / favourites : 0.0) + 0.1 / count;
 }
@@ -65,11 +67,11 @@ double log_target(const TestScene& test, const PathSampler::Sample& path) {
 
 // Law: in a closed diffuse sphere of albedo rho that emits L = 1, E[f / q] = sum rho^k over the
 // allowed lengths, and each length n has its own rho^(n - 1).
-TEST(PathSampler, ClosedFurnace) {
+void check_furnace(LargeSteps large_steps) {
   const double albedo = 0.6;
   const Scene scene = furnace(albedo);
   const int max_depth = 6;
-  const PathSampler sampler(scene, max_depth);
+  const PathSampler sampler(scene, max_depth, large_steps);
   Moments total;
   std::array<Moments, 7> by_length;
   draw(sampler, 101, 30000, [&](const std::optional<PathSampler::Sample>& path) {
@@ -94,6 +96,9 @@ TEST(PathSampler, ClosedFurnace) {
         << n;
 }
 
+TEST(PathSampler, ClosedFurnace) { check_furnace(LargeSteps::Path); }
+TEST(PathSampler, ClosedFurnaceFromBothEnds) { check_furnace(LargeSteps::Bdpt); }
+
 // Law: q is a density. Drawn with one table and weighted with q' / q, each kind of path comes as
 // often as it does when it is drawn with the other table: for every length, end and emitter,
 // whether a strategy hits or connects. The weights are bounded, so the means are normal.
@@ -102,8 +107,8 @@ TEST(PathSampler, DensitiesOfDifferentTablesAgree) {
   int kinds = 0;
   std::vector<double> p_values;
   for (const TestScene& test : test_scenes()) {
-    const PathSampler hitting = biased_sampler(test, EndStrategy::Hit);
-    const PathSampler connecting = biased_sampler(test, EndStrategy::Connect);
+    const PathSampler hitting = biased_sampler(test, Favourite::Hit);
+    const PathSampler connecting = biased_sampler(test, Favourite::Connect);
     // Frequencies under `hitting`, found with both samplers.
     std::map<std::string, double> plain;
     std::map<std::string, std::array<double, 2>> weighted;
@@ -137,10 +142,62 @@ TEST(PathSampler, DensitiesOfDifferentTablesAgree) {
   for (const double p : p_values) EXPECT_GT(p, significance);
 }
 
+/// A sampler from both ends that makes nine in ten of its attempts with s = `light_vertices`.
+PathSampler sampler_of(const TestScene& test, int light_vertices) {
+  PathSampler sampler(test.scene, test.max_depth, LargeSteps::Bdpt);
+  std::vector<RunningMean> weights(static_cast<std::size_t>(sampler.entry_count()));
+  for (int i = 0; i < sampler.entry_count(); ++i)
+    if (sampler.strategy(i).light_vertices == light_vertices)
+      weights[static_cast<std::size_t>(i)].add(1.0);
+  sampler.learn(weights);
+  return sampler;
+}
+
+// Law: the same for paths from both ends, whatever the number s of vertices on the light's side. A
+// path with s = 0, 1, 2, .. light vertices is as dense as the paths that come with another s.
+TEST(PathSampler, DensitiesOfAllStrategiesAgree) {
+  const int count = 60000;
+  int kinds = 0;
+  std::vector<double> p_values;
+  for (const TestScene& test : test_scenes()) {
+    const PathSampler uniform(test.scene, test.max_depth, LargeSteps::Bdpt);
+    std::map<std::string, double> plain;
+    draw(uniform, 120, count, [&](const std::optional<PathSampler::Sample>& path) {
+      if (path && std::isfinite(log_target(test, *path))) plain[kind(path->topology)] += 1.0;
+    });
+    for (int s = 0; s <= test.max_depth; ++s) {
+      const PathSampler favouring = sampler_of(test, s);
+      std::map<std::string, std::array<double, 2>> weighted;
+      draw(favouring, 121, count, [&](const std::optional<PathSampler::Sample>& path) {
+        if (!path || !std::isfinite(log_target(test, *path))) return;
+        const double ratio = std::exp(uniform.log_density(path->topology, path->coordinates) -
+                                      favouring.log_density(path->topology, path->coordinates));
+        EXPECT_LT(ratio, 10.0 * (1.0 + 1e-9));
+        auto& sums = weighted[kind(path->topology)];
+        sums[0] += ratio;
+        sums[1] += ratio * ratio;
+      });
+      for (const auto& [name, hits] : plain) {
+        if (hits < 100) continue;
+        const auto& sums = weighted[name];
+        ++kinds;
+        const double deviation = std::sqrt(hits + sums[1]);
+        const double p = normal_p_value((hits - sums[0]) / deviation);
+        p_values.push_back(p);
+        EXPECT_GT(p, 1e-6) << test.name << ", s = " << s << ": " << name << ": " << hits
+                           << " against " << sums[0] << " +- " << deviation;
+      }
+    }
+  }
+  EXPECT_GT(kinds, 200);
+  const double significance = sidak(0.01, kinds);
+  for (const double p : p_values) EXPECT_GT(p, significance);
+}
+
 /// The chance that a path drawn from the uniform table came by a connection, from densities alone:
 /// with q = c (h + k), h by hitting and k by connecting, and q' = c_h h + c_k k of another table,
 /// k / (h + k) = (q' / q - c_h / c) / (c_k / c - c_h / c).
-double connection_share(const PathSampler& uniform, const PathSampler& other, EndStrategy favourite,
+double connection_share(const PathSampler& uniform, const PathSampler& other, Favourite favourite,
                         const PathSampler::Sample& path) {
   const int length = path.topology.length();
   const double c = 1.0 / uniform.entry_count();
@@ -185,11 +242,11 @@ TEST(PathSampler, StrategiesComeByTheirShare) {
   std::map<std::string, Tally> tallies;
   const auto count_paths = [&](const TestScene& test, int count) {
     const PathSampler uniform(test.scene, test.max_depth);
-    const PathSampler other = biased_sampler(test, EndStrategy::Connect);
+    const PathSampler other = biased_sampler(test, Favourite::Connect);
     draw(uniform, 108, count, [&](const std::optional<PathSampler::Sample>& path) {
       if (!path || path->topology.length() == 1) return;
       if (!std::isfinite(log_target(test, *path))) return;
-      const double share = connection_share(uniform, other, EndStrategy::Connect, *path);
+      const double share = connection_share(uniform, other, Favourite::Connect, *path);
       EXPECT_GT(share, -1e-9);
       EXPECT_LT(share, 1.0 + 1e-9);
       Tally& tally = tallies[end_kind(test.scene, path->topology)];
@@ -241,9 +298,9 @@ TEST(PathSampler, MeanWeightIsTheMeanOfTheImage) {
   const int tests = 2 * static_cast<int>(test_scenes().size());
   const double significance = sidak(0.01, tests);
   for (const TestScene& test : test_scenes()) {
-    const Moments hitting = mean_weight(test, biased_sampler(test, EndStrategy::Hit), 104, 100000);
+    const Moments hitting = mean_weight(test, biased_sampler(test, Favourite::Hit), 104, 100000);
     const Moments connecting =
-        mean_weight(test, biased_sampler(test, EndStrategy::Connect), 105, 100000);
+        mean_weight(test, biased_sampler(test, Favourite::Connect), 105, 100000);
     EXPECT_GT(welch_p_value(hitting, connecting), significance)
         << test.name << ": " << hitting.mean() << " +- " << hitting.error() << " and "
         << connecting.mean() << " +- " << connecting.error();
@@ -265,6 +322,20 @@ TEST(PathSampler, MeanWeightIsTheMeanOfTheImage) {
     EXPECT_GT(welch_p_value(better, traced), significance)
         << test.name << ": " << better.mean() << " +- " << better.error() << " and "
         << traced.mean() << " +- " << traced.error();
+  }
+}
+
+// Law: so it is for paths from both ends.
+TEST(PathSampler, MeanWeightFromBothEnds) {
+  const double significance = sidak(0.01, 2 * static_cast<int>(test_scenes().size()));
+  for (const TestScene& test : test_scenes()) {
+    const Moments hitting = mean_weight(test, biased_sampler(test, Favourite::Hit), 109, 200000);
+    for (const int s : {2, 3}) {
+      const Moments both = mean_weight(test, sampler_of(test, s), 110, 200000);
+      EXPECT_GT(welch_p_value(hitting, both), significance)
+          << test.name << ", s = " << s << ": " << hitting.mean() << " +- " << hitting.error()
+          << " and " << both.mean() << " +- " << both.error();
+    }
   }
 }
 

@@ -189,7 +189,8 @@ ScaledColor<T> eval_bsdf(const RoughDielectric& b, const SurfacePoint<T>& at, co
     return ScaledColor<T>::zero();
   const Microfacets& m = b.microfacets;
   const T g = m.g1(cos_i) * m.g1(cos_o);
-  const T fresnel = fresnel_dielectric(T(abs(ih) / sqrt(h2)), eta);
+  // Not a quotient: that of Jets is rounded in another way, which total reflection amplifies.
+  const T fresnel = fresnel_dielectric(T(abs(ih) * (1.0 / sqrt(h2))), eta);
   const T log_dg = m.log_d(cos_h2) + log(g / abs(cos_i));
   if (reflection) {
     return {log_dg + log(0.25 * fresnel), b.specular_reflectance.eval(at.uv)};

@@ -94,7 +94,8 @@ Interaction<T> interact_shape(const TriangleMesh& mesh, std::uint32_t primitive,
   const Vec3d e1 = corner[1] - corner[0];
   const Vec3d e2 = corner[2] - corner[0];
   const Vec3d n = e1.cross(e2);
-  const T t = (n.dot(corner[0]) - dot(n, ray.origin)) / dot(n, ray.direction);
+  // Not a quotient: that of Jets is rounded in another way than that of doubles.
+  const T t = (n.dot(corner[0]) - dot(n, ray.origin)) * (1.0 / dot(n, ray.direction));
   Interaction<T> at;
   at.p = along(ray.origin, t, ray.direction);
   const double n2 = n.squaredNorm();
@@ -168,7 +169,7 @@ Interaction<T> interact_shape(const Disk& disk, std::uint32_t /*primitive*/, con
   using std::atan2;
   using std::sqrt;
   const Vec3d n = disk.u.cross(disk.v);
-  const T t = (n.dot(disk.center) - dot(n, ray.origin)) / dot(n, ray.direction);
+  const T t = (n.dot(disk.center) - dot(n, ray.origin)) * (1.0 / dot(n, ray.direction));
   Interaction<T> at;
   at.p = along(ray.origin, t, ray.direction);
   at.n_g = constant<T>(Vec3d(n.normalized()));

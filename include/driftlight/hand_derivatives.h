@@ -68,7 +68,7 @@ struct Vertex {
   const Shape* shape;
   Vec3d p, n_g, n_s, wi, wo;
   Vec2d uv;
-  double length;      ///< of the edge that arrives
+  double length;      ///< of the edge that arrives; negative where a displaced path runs backward
   double hit_cosine;  ///< n_g . v of that edge
   double cos_i, cos_o, io;
   Scattering scattering;
@@ -143,7 +143,7 @@ struct Recorder : WalkVisitor<double> {
     x.wi = e.wi;
     x.wo = e.wo;
     x.uv = e.at.uv;
-    x.length = (x.p - from).norm();
+    x.length = (from - x.p).dot(x.wi);
     x.hit_cosine = Rules::hit_cosine(e.shape.geometry, from, Vec3d(-x.wi), x.n_g);
     x.cos_i = e.at.n_s.dot(e.wi);
     x.scattering = e.scattering;
@@ -453,8 +453,8 @@ class Sweep {
     const Hit& hit_at = topology_.vertices[topology_.scatter_count].hit;
     const Shape& shape = scene_.shapes()[hit_at.shape];
     const Vec3d& from = path_.origin(path_.count);
-    const double length = (path_.end - from).norm();
     const Vec3d& v = path_.count == 0 ? path_.v0 : vertex(path_.count - 1).wo;
+    const double length = (path_.end - from).dot(v);
     const Vec3d n = surface_normal(shape.geometry, hit_at.primitive, path_.end);
     const double cosine = Rules::hit_cosine(shape.geometry, from, v, n);
     position(shape, hit(v, n, cosine, length, xi_t, xi_b, omega_t, omega_b));

@@ -220,7 +220,7 @@ struct HandRules {
     const double i = 1.0 + e * io;
     const double o = io + e;
     const double h = std::sqrt(h2);
-    const Fresnel glass = fresnel(std::abs(i) / h, eta);
+    const Fresnel glass = fresnel(std::abs(i) * (1.0 / h), eta);
     const double d_cosine = std::copysign(e, i) * (1.0 - i / h2) / h;
     if (reflection) {
       f.io[3] += glass.slope / glass.value * d_cosine;

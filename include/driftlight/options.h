@@ -49,10 +49,17 @@ struct KernelOptions {
   double scale_decades = 1;
 };
 
+/// How large steps find their paths.
+enum class LargeSteps {
+  Path,  ///< from the sensor: hitting emitters, or connecting to them
+  Bdpt,  ///< from both ends, with all connections
+};
+
 /// The Langevin sampler of [E63].
 struct LangevinOptions {
   KernelOptions kernel;
   double large_step_probability = 0.2;
+  LargeSteps large_steps = LargeSteps::Bdpt;
   /// Independent chains, whatever the number of threads.
   int chains = 128;
   /// Samples that estimate the normalization b and start the chains.
@@ -72,6 +79,29 @@ struct PathOptions {
   void validate() const;
 };
 
+/// How the strategies that can make a path share it, by their densities p_i (Veach 1997, 9.2).
+enum class MisHeuristic {
+  Balance,  ///< p_i / sum_j p_j
+  Power,    ///< p_i^2 / sum_j p_j^2
+};
+
+/// The bidirectional path tracer.
+struct BdptOptions {
+  int max_depth = 12;
+  MisHeuristic heuristic = MisHeuristic::Power;
+
+  /// Throws OptionError.
+  void validate() const;
+};
+
+/// The light tracer.
+struct LightOptions {
+  int max_depth = 12;
+
+  /// Throws OptionError.
+  void validate() const;
+};
+
 /// One option by name, bound to a field.
 struct OptionEntry {
   std::string_view name;
@@ -84,6 +114,8 @@ struct OptionEntry {
 /// The options of an integrator, in the order in which they are listed.
 std::vector<OptionEntry> entries(LangevinOptions& options);
 std::vector<OptionEntry> entries(PathOptions& options);
+std::vector<OptionEntry> entries(BdptOptions& options);
+std::vector<OptionEntry> entries(LightOptions& options);
 
 /// Sets `name` to `value`. Throws OptionError naming the option and the valid ones or values.
 void set_option(const std::vector<OptionEntry>& entries, const std::string& name,

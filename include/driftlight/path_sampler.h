@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Independent paths from path tracing, with their exact density: the large steps (DESIGN 1.8).
+/// Independent light paths with their exact density: the large steps of the chain.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <vector>
 
-#include "driftlight/contribution.h"
+#include "driftlight/options.h"
 #include "driftlight/phase_space.h"
 #include "driftlight/random.h"
 #include "driftlight/running_mean.h"
@@ -14,22 +13,20 @@
 
 namespace driftlight {
 
-class RayFollower;
-struct SurfaceHit;
-
-/// How the last edge of a sampled path is found.
-enum class EndStrategy : std::uint8_t { Hit, Connect };
-
-/// Draws a path length n and a strategy from a table, then a path: v_0 uniform over the film, BSDF
-/// sampling at each vertex, and either whatever the last direction hits or a connection to a drawn
-/// emitter point. The density of a path is the sum over both strategies,
-///   q(X) = W(v_0) prod_k p(v_k) [ c_(n,hit) p(v_last) + c_(n,connect) p_emitter ],
-/// in the measure of its coordinates, with delta vertices by their probability; f / q is
-/// measure-free and is the weight of the balance heuristic.
+/// Draws a strategy (n, s) from a table, then a path of n edges: its last s vertices x_n, x_{n-1},
+/// .. from the light (the point on the emitter, then emission and BSDF sampling), the others from
+/// the sensor (v_0 uniform over the film, then BSDF sampling), and the edge between the two ends by
+/// a connection. s = 0 hits the emitter, s = 1 is next-event estimation, s = n connects to the
+/// sensor (Veach 1997, ch. 10). The density of a path is the sum over all strategies that can make
+/// it,
+///   q(X) = sum_s c_(n,s) q_s(X),
+/// in the measure of its coordinates (path_density.h); f / q is measure-free and is the weight of
+/// the balance heuristic.
 class PathSampler {
  public:
-  /// All lengths up to max_depth and both strategies equally likely.
-  PathSampler(const Scene& scene, int max_depth);
+  /// All strategies equally likely: of LargeSteps::Path those with s <= 1, but not the connection
+  /// of the sensor itself; of LargeSteps::Bdpt all.
+  PathSampler(const Scene& scene, int max_depth, LargeSteps large_steps = LargeSteps::Path);
 
   struct Sample {
     PathTopology topology;
@@ -37,7 +34,13 @@ class PathSampler {
     int entry;  ///< of the table
   };
 
-  int entry_count() const { return table_.size(); }
+  struct Strategy {
+    int length;          ///< n
+    int light_vertices;  ///< s
+  };
+
+  int entry_count() const { return static_cast<int>(strategies_.size()); }
+  const Strategy& strategy(int entry) const { return strategies_[static_cast<std::size_t>(entry)]; }
   /// Replaces the table, given the weights f / q by entry of samples from the uniform one. Nearly
   /// half of the attempts go by energy, which gives large steps that are accepted; as many by the
   /// root of the second moment, which minimises the variance of b (Neyman's allocation: what scores
@@ -52,11 +55,10 @@ class PathSampler {
   double log_density(const PathTopology& topology, const PathCoordinates& coordinates) const;
 
  private:
-  std::optional<Sample> end_by_hit(Sample path, RayFollower& follower, const Bsdf* last_bsdf) const;
-  std::optional<Sample> connect(Sample path, const SurfaceHit& surface, Rng& rng) const;
-
   const Scene& scene_;
   int max_depth_;
+  std::vector<Strategy> strategies_;
+  std::vector<int> first_of_length_;  ///< entry of (n, 0), by n; one past the end at last
   DiscreteDistribution table_;
 };
 

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "derivatives/passes.h"
+
+namespace driftlight::bench {
+
+void gradient_stride8(const Scene& scene, const PathTopology& topology, const Chart& chart,
+                      Vector& gradient) {
+  gradient_in_passes<double, 8>(scene, topology, chart, gradient);
+}
+
+}  // namespace driftlight::bench

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "light_end.h"
+
+#include <cmath>
+
+namespace driftlight {
+namespace {
+
+LightEnd environment_end(const Scene& scene, std::uint32_t index, const Vec3d& direction) {
+  LightEnd end;
+  end.kind = LightEnd::Kind::Environment;
+  end.emitter = index;
+  end.p = direction;
+  const Emitter& emitter = scene.emitters()[index];
+  const double choice = scene.emitter_probability(index);
+  if (const auto* map = std::get_if<EnvironmentMap>(&emitter)) {
+    end.emitted = map->eval(direction);
+    end.density = choice * map->pdf(direction);
+  } else {
+    end.emitted = std::get<ConstantEnvironment>(emitter).radiance;
+    end.density = choice * 0.25 * kInvPi;
+  }
+  return end;
+}
+
+LightEnd area_end(const Scene& scene, std::uint32_t index, const EmitterPoint& y) {
+  const auto& light = std::get<AreaEmitter>(scene.emitters()[index]);
+  LightEnd end;
+  end.kind = LightEnd::Kind::Area;
+  end.emitter = index;
+  end.p = y.p;
+  end.n = y.n;
+  end.emitted = light.radiance;
+  end.density = scene.emitter_probability(index) / scene.shapes()[light.shape].extent.area;
+  return end;
+}
+
+LightEnd point_end(const Scene& scene, std::uint32_t index) {
+  const auto& light = std::get<PointEmitter>(scene.emitters()[index]);
+  LightEnd end;
+  end.kind = LightEnd::Kind::Point;
+  end.emitter = index;
+  end.p = light.position;
+  end.emitted = light.intensity;
+  end.density = scene.emitter_probability(index);
+  return end;
+}
+
+}  // namespace
+
+LightEnd sample_light_end(const Scene& scene, Rng& rng) {
+  double u = rng.uniform();
+  const std::uint32_t index = scene.sample_emitter(u);
+  const Vec2d square = rng.uniform2();
+  const Emitter& emitter = scene.emitters()[index];
+  if (const auto* map = std::get_if<EnvironmentMap>(&emitter))
+    return environment_end(scene, index, map->sample(square.x(), square.y()));
+  if (is_environment(emitter))
+    return environment_end(scene, index, square_to_sphere(square.x(), square.y()));
+  if (const auto* light = std::get_if<AreaEmitter>(&emitter))
+    return area_end(scene, index, scene.sample_area(*light, square.x(), square.y()));
+  return point_end(scene, index);
+}
+
+std::optional<LightEnd> light_end_at(const Scene& scene, const SurfaceHit& surface) {
+  const auto& emitter = scene.shapes()[surface.hit.shape].emitter;
+  if (!emitter || !surface.front) return std::nullopt;
+  return area_end(scene, *emitter, {surface.at.p, surface.at.n_g});
+}
+
+std::optional<LightEnd> light_end_toward(const Scene& scene, const Vec3d& direction) {
+  if (!scene.environment()) return std::nullopt;
+  return environment_end(scene, *scene.environment(), direction);
+}
+
+LightEdge edge_to(const LightEnd& end, const Vec3d& p) {
+  if (end.kind == LightEnd::Kind::Environment) return {end.p, 1.0, 1.0};
+  const Vec3d edge = end.p - p;
+  const double inverse_r2 = 1.0 / edge.squaredNorm();
+  const Vec3d direction = edge * std::sqrt(inverse_r2);
+  const double cosine = end.kind == LightEnd::Kind::Area ? -end.n.dot(direction) : 1.0;
+  return {direction, inverse_r2, cosine};
+}
+
+bool reaches(const Scene& scene, const LightEnd& end, const SurfaceHit& surface,
+             const LightEdge& edge) {
+  if (end.kind == LightEnd::Kind::Environment) {
+    const Vec3d start = scene.leave(surface.at.p, surface.at.n_g, edge.direction);
+    return !scene.occluded_to_infinity(start, edge.direction);
+  }
+  return connection_status(scene, surface, scene.emitters()[end.emitter], {end.p, end.n}) ==
+         TraceStatus::Ok;
+}
+
+double emission_density(const Scene& scene, const LightEnd& end, double cosine) {
+  switch (end.kind) {
+    case LightEnd::Kind::Area:
+      return cosine * kInvPi;
+    case LightEnd::Kind::Point:
+      return 0.25 * kInvPi;
+    case LightEnd::Kind::Environment:
+      break;
+  }
+  return kInvPi / (scene.radius() * scene.radius());
+}
+
+Emission sample_emission(const Scene& scene, const LightEnd& end, Rng& rng) {
+  const Vec2d u = rng.uniform2();
+  switch (end.kind) {
+    case LightEnd::Kind::Area: {
+      const Vec3d local = square_to_cosine_hemisphere(u.x(), u.y());
+      const Vec3d v = to_world(local, end.n);
+      return {end.p, scene.leave(end.p, end.n, v), v, local.z()};
+    }
+    case LightEnd::Kind::Point:
+      return {end.p, end.p, square_to_sphere(u.x(), u.y()), 1.0};
+    case LightEnd::Kind::Environment:
+      break;
+  }
+  // From the disk that touches the bounding sphere, across the ray.
+  const Vec2d disk = square_to_disk(u.x(), u.y());
+  const Vec3d origin = scene.center() + scene.radius() * to_world({disk.x(), disk.y(), 1.0}, end.p);
+  return {origin, origin, -end.p, 1.0};
+}
+
+}  // namespace driftlight

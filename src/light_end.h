@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The light's end of a path, for the bidirectional integrators: how it is drawn, what it emits,
+/// and with which densities.
+#pragma once
+
+#include <optional>
+
+#include "driftlight/random.h"
+#include "ray_follower.h"
+
+namespace driftlight {
+
+/// A point on an emitter. The environment is a point at infinity: its measure is solid angle, and
+/// an edge to it has neither a cosine at its far end nor 1 / r^2.
+struct LightEnd {
+  enum class Kind : std::uint8_t { Area, Point, Environment };
+
+  Kind kind = Kind::Area;
+  std::uint32_t emitter = 0;
+  Vec3d p{0, 0, 0};  ///< position; of the environment the unit direction toward it
+  Vec3d n{0, 0, 0};  ///< unit normal of an area emitter, on the side that emits
+  Rgbd emitted{0, 0, 0};  ///< radiance; of a point emitter its intensity
+  /// Of emitter sampling: probability of the emitter, times 1 / area or the density of the
+  /// direction.
+  double density = 0;
+
+  /// False if no ray from elsewhere can end here.
+  bool can_be_hit() const { return kind != Kind::Point; }
+};
+
+/// Draws an emitter and a point on it.
+LightEnd sample_light_end(const Scene& scene, Rng& rng);
+/// The end of a ray that has come to the surface; none if nothing is emitted toward it.
+std::optional<LightEnd> light_end_at(const Scene& scene, const SurfaceHit& surface);
+/// The end of a ray that leaves the scene; none without an environment.
+std::optional<LightEnd> light_end_toward(const Scene& scene, const Vec3d& direction);
+
+/// The edge from a surface point to a light end; 1 / r^2 and the cosine are 1 where there are none.
+struct LightEdge {
+  Vec3d direction;   ///< unit, away from the surface
+  double inverse_r2;
+  double cosine;  ///< at the light end; not positive on the dark side
+};
+LightEdge edge_to(const LightEnd& end, const Vec3d& p);
+
+/// Whether light passes along that edge.
+bool reaches(const Scene& scene, const LightEnd& end, const SurfaceHit& surface,
+             const LightEdge& edge);
+
+/// Density of the ray that leaves the end, for a cosine > 0 with its normal:
+///   area cos / pi per solid angle, point 1 / (4 pi) per solid angle,
+///   environment 1 / (pi R^2) per area across the ray, R the radius of the scene.
+double emission_density(const Scene& scene, const LightEnd& end, double cosine);
+
+/// A ray drawn with that density.
+struct Emission {
+  Vec3d origin;
+  Vec3d start;  ///< the origin, moved off its surface
+  Vec3d direction;
+  double cosine;  ///< with the normal of an area emitter; else 1
+};
+Emission sample_emission(const Scene& scene, const LightEnd& end, Rng& rng);
+
+}  // namespace driftlight

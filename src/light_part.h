@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The part of a path that is drawn from the light.
+#pragma once
+
+#include <optional>
+
+#include "driftlight/random.h"
+#include "ray_follower.h"
+
+namespace driftlight {
+
+/// Vertices in order from the emitter.
+struct LightPart {
+  struct Vertex {
+    Vec3d p;
+    Hit hit;
+    const Bsdf* bsdf;
+    Vec3d to_sensor;  ///< direction of the edge that leaves it toward the sensor; not of the last
+    bool delta;
+    Scattering scattering;
+  };
+
+  std::uint32_t emitter = 0;
+  bool infinite = false;  ///< the emitter is an environment
+  EmitterPoint point;     ///< on a point or area emitter
+  Vec3d sky;              ///< unit direction toward an environment
+  int count = 0;          ///< of surface vertices
+  std::array<Vertex, kMaxPathLength> vertices;
+  std::optional<SurfaceHit> last;  ///< the last surface vertex
+
+  const Vertex& operator[](int i) const { return vertices[static_cast<std::size_t>(i)]; }
+};
+
+/// Draws an emitter, a point on it (a direction, of an environment) and, for surface_vertices > 0,
+/// an emitted ray and as many surface vertices by BSDF sampling, with the densities of
+/// path_density.h. None if the ray is lost on the way.
+std::optional<LightPart> sample_light_part(const Scene& scene, int surface_vertices, Rng& rng);
+
+}  // namespace driftlight

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "path_density.h"
+
+#include <cmath>
+
+#include "driftlight/walk.h"
+
+namespace driftlight {
+namespace {
+
+/// What the densities need of a scattering vertex x_k, k >= 1.
+struct Vertex {
+  double forward;       ///< C_k
+  double backward;      ///< l_k: density of the direction toward the sensor; of a delta lobe P
+  double cosine_in;     ///< of the edge from the sensor's side
+  double cosine_out;    ///< of v_k
+  double index_ratio2;  ///< (n before / n behind)^2 of a delta lobe
+  double r2;            ///< squared length of the edge from x_{k-1}
+  bool delta;
+};
+
+class Recorder : public WalkVisitor<double> {
+ public:
+  explicit Recorder(const Scene& scene) : scene_(scene), last_(scene.camera().origin) {}
+
+  void sensor(const PerspectiveCamera& camera, const Vec3d& v) {
+    importance = std::exp(camera.log_importance(v));
+  }
+  void position(const Shape&, const Vec3d& p) {
+    r2 = (p - last_).squaredNorm();
+    last_ = p;
+  }
+  void scatter(const ScatterEvent<double>& e) {
+    Vertex& x = add(e);
+    x.delta = false;
+    x.forward = pdf(e.bsdf, e.surface(), e.wi, e.wo);
+    x.backward = pdf(e.bsdf, e.surface(), e.wo, e.wi);
+    x.index_ratio2 = 1.0;
+  }
+  void connect(const ScatterEvent<double>& e) { scatter(e); }
+  void delta(const ScatterEvent<double>& e) {
+    Vertex& x = add(e);
+    x.delta = true;
+    x.forward = delta_probability(e.bsdf, e.surface(), e.wi, e.scattering);
+    x.backward = delta_probability(e.bsdf, e.surface(), e.wo, e.scattering);
+    x.index_ratio2 = 1.0;
+    if (e.scattering == Scattering::Transmission) {
+      const double eta = std::get<Dielectric>(e.bsdf).eta;
+      const double beyond = e.at.n_s.dot(e.wi) > 0.0 ? eta : 1.0 / eta;
+      x.index_ratio2 = 1.0 / (beyond * beyond);
+    }
+  }
+  void hit(const AreaEmitter& light, const double& cosine, const double& squared) {
+    area_end(light, cosine, squared);
+    measure = 1.0;
+  }
+  void area_connection(const AreaEmitter& light, const double& cosine, const double& squared) {
+    area_end(light, cosine, squared);
+    measure = cosine / squared;
+  }
+  void environment(const Emitter& light, const Vec3d& v) {
+    const auto* map = std::get_if<EnvironmentMap>(&light);
+    const double direction = map != nullptr ? map->pdf(v) : 0.25 * kInvPi;
+    connected = direction;
+    emitted = direction * kInvPi / (scene_.radius() * scene_.radius());
+    r2_end = 1.0;
+  }
+  void point_connection(const PointEmitter&, const double& squared) {
+    connected = 1.0;
+    emitted = 0.25 * kInvPi / squared;
+    can_hit = false;
+    r2_end = squared;
+  }
+
+  std::array<Vertex, kMaxPathLength> vertices;
+  int count = 0;
+  double importance = 1;  ///< C_0
+  double r2 = 1;          ///< of the last edge to a surface
+  double measure = 1;     ///< d omega_{n-1} / (measure of the coordinates)
+  double connected = 0;   ///< density of x_n by s = 1, per d omega_{n-1}
+  double emitted = 0;     ///< density of x_n and of its direction, for s >= 2, as l_n / cos_n
+  double r2_end = 1;
+  bool can_hit = true;
+
+ private:
+  Vertex& add(const ScatterEvent<double>& e) {
+    Vertex& x = vertices[static_cast<std::size_t>(count++)];
+    x.cosine_in = std::abs(e.at.n_g.dot(e.wi));
+    x.cosine_out = std::abs(e.at.n_g.dot(e.wo));
+    x.r2 = r2;
+    return x;
+  }
+  /// connected = r^2 / (A cos), emitted = (1 / A) (cos / pi) / cos
+  void area_end(const AreaEmitter& light, double cosine, double squared) {
+    const double per_area = 1.0 / scene_.shapes()[light.shape].extent.area;
+    connected = per_area * squared / cosine;
+    emitted = per_area * kInvPi;
+    r2_end = squared;
+  }
+
+  const Scene& scene_;
+  Vec3d last_;
+};
+
+}  // namespace
+
+StrategyDensities strategy_densities(const Scene& scene, const PathTopology& topology,
+                                     const PathCoordinates& coordinates) {
+  Recorder path(scene);
+  walk<double>(scene, topology, coordinates, path);
+  const int n = topology.length();
+  const auto vertex = [&](int k) -> const Vertex& {
+    return path.vertices[static_cast<std::size_t>(k - 1)];
+  };
+  // prefix[t] = C_0 .. C_{t-2}: the camera part of t vertices.
+  std::array<double, kMaxPathLength + 2> prefix;
+  prefix[0] = prefix[1] = 1.0;
+  for (int t = 2; t <= n + 1; ++t)
+    prefix[static_cast<std::size_t>(t)] = prefix[static_cast<std::size_t>(t - 1)] *
+                                          (t == 2 ? path.importance : vertex(t - 2).forward);
+
+  StrategyDensities result;
+  auto& q = result.by_light_vertices;
+  if (path.can_hit) q[0] = path.measure * prefix[static_cast<std::size_t>(n + 1)];
+  const double choice = scene.emitter_probability(topology.emitter) * path.measure;
+  // Whether x_{t-1} can be connected to.
+  const auto connects = [&](int t) { return t == 1 || !vertex(t - 1).delta; };
+  if (connects(n)) q[1] = choice * path.connected * prefix[static_cast<std::size_t>(n)];
+  // suffix: the light part down to x_t, with cos_t of the next chain still to come.
+  double suffix = choice * path.emitted;
+  for (int t = n - 1; t >= 1; --t) {
+    const Vertex& x = vertex(t);
+    if (x.delta) {
+      if (topology.end == PathEnd::PointConnection && t == n - 1) return result;
+      suffix *= x.backward * x.index_ratio2;
+      continue;
+    }
+    suffix *= x.cosine_out;
+    if (connects(t))
+      q[static_cast<std::size_t>(n + 1 - t)] =
+          suffix * x.r2 / x.cosine_in * prefix[static_cast<std::size_t>(t)];
+    suffix *= x.backward / x.cosine_in;
+  }
+  return result;
+}
+
+}  // namespace driftlight
