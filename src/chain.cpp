@@ -86,7 +86,7 @@ std::optional<double> Chain::propose_small() {
   ChainState& from = current();
   ChainState& to = proposed();
   const KernelOptions& options = options_.kernel;
-  if (!from.has_step) prepare_step(scene_, options, from);
+  if (!from.has_step) prepare(from);
   if (!from.finite) {
     ++statistics_.rejections.non_finite;
     return std::nullopt;
@@ -100,7 +100,7 @@ std::optional<double> Chain::propose_small() {
   }
   to.coordinates = from.chart.retract(delta);
   if (!evaluate_proposed()) return std::nullopt;
-  prepare_step(scene_, options, to);
+  prepare(to);
   if (!to.finite) {
     ++statistics_.rejections.non_finite;
     return std::nullopt;
@@ -118,6 +118,11 @@ std::optional<double> Chain::propose_small() {
   }
   return std::exp(
       log_acceptance(from.contribution.log_target, to.contribution.log_target, forward, reverse));
+}
+
+void Chain::prepare(ChainState& state) {
+  prepare_step(scene_, options_.kernel, state);
+  if (probe_ != nullptr) probe_->visit(state.topology, state.coordinates);
 }
 
 bool Chain::evaluate_proposed() {

@@ -3,9 +3,11 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
+#include "derivative_judge.h"
 #include "driftlight/constraints.h"
 #include "driftlight/contribution.h"
 #include "driftlight/exact_divergence.h"
@@ -16,113 +18,12 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// First steps of Ridders' method, in widths: the smaller ones see past a kink close by and fit
-/// into what is left before an edge.
-constexpr std::array<double, 4> kSteps{1e-2, 1e-3, 1e-4, 1e-5};
-/// Of the slopes from either side.
-constexpr std::array<double, 3> kSideSteps{1e-3, 1e-4, 1e-5};
-/// What slopes from one side may be off, of second order as they are, in tolerances.
-constexpr double kSideTolerance = 10.0;
 /// Of gradients, in widths.
 constexpr double kGradientFloor = 0.01;
 /// Of slopes of Q, in widths.
 constexpr double kSlopeFloor = 0.01;
 
 double max_or_infinity(double a, double b) { return std::isfinite(b) ? std::max(a, b) : kInfinity; }
-
-// ---- Derivatives against differences ----------------------------------------------------------
-
-/// Values of several functions of one coordinate.
-using Values = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMaxResiduals, 1>;
-
-/// Judges derivatives of f at 0, all at once. F: Values(double x).
-template <class F>
-class Judge {
- public:
-  /// `floor` is the smallest scale of the relative errors.
-  Judge(const F& f, const Values& derivatives, double width, double floor, double tolerance)
-      : f_(f),
-        derivatives_(derivatives),
-        width_(width),
-        floor_(floor),
-        tolerance_(tolerance),
-        checks_(static_cast<std::size_t>(derivatives.size())) {}
-
-  std::vector<DerivativeCheck> run() {
-    for (DerivativeCheck& check : checks_) check.error = kInfinity;
-    for (const double step : kSteps) {
-      compare(step * width_);
-      if (all_agree()) return std::move(checks_);
-    }
-    for (const double step : kSideSteps) look_from_each_side(step * width_);
-    return std::move(checks_);
-  }
-
- private:
-  bool all_agree() const {
-    return std::all_of(checks_.begin(), checks_.end(),
-                       [](const auto& check) { return check.verdict == Verdict::Agrees; });
-  }
-  double derivative(std::size_t i) const { return derivatives_[static_cast<Eigen::Index>(i)]; }
-  double scale(double derivative, double numeric) const {
-    return std::max({std::abs(derivative), std::abs(numeric), floor_});
-  }
-
-  void compare(double h) {
-    std::vector<RiddersTableau> tableaus(checks_.size());
-    for (bool more = true; more; h /= RiddersTableau::kRatio) {
-      const Values slope = (f_(h) - f_(-h)) / (2.0 * h);
-      more = false;
-      for (std::size_t i = 0; i < checks_.size(); ++i)
-        more = tableaus[i].add(slope[static_cast<Eigen::Index>(i)]) || more;
-    }
-    for (std::size_t i = 0; i < checks_.size(); ++i)
-      take(derivative(i), tableaus[i].best(), checks_[i]);
-  }
-
-  /// Keeps the differences that agree, else those that claim to be the best.
-  void take(double derivative, const Derivative& numeric, DerivativeCheck& check) const {
-    if (check.verdict == Verdict::Agrees) return;
-    if (!std::isfinite(derivative)) {
-      check = {numeric, kInfinity, Verdict::Wrong};
-      return;
-    }
-    if (!std::isfinite(numeric.value) || !std::isfinite(numeric.error)) return;
-    const double unit = scale(derivative, numeric.value);
-    const double difference = std::abs(derivative - numeric.value);
-    const double allowed = tolerance_ * unit;
-    if (difference + numeric.error <= allowed) {
-      check = {numeric, difference / unit, Verdict::Agrees};
-    } else if (numeric.error < check.numeric.error) {
-      const bool certain = difference > allowed + numeric.error && numeric.error <= allowed;
-      check = {numeric, difference / unit, certain ? Verdict::Wrong : Verdict::Undecided};
-    }
-  }
-
-  /// A kink, or an edge: the derivative is that of one side only.
-  void look_from_each_side(double h) {
-    const Values f0 = f_(0.0);
-    const Values right = (-3.0 * f0 + 4.0 * f_(h) - f_(2.0 * h)) / (2.0 * h);
-    const Values left = (3.0 * f0 - 4.0 * f_(-h) + f_(-2.0 * h)) / (2.0 * h);
-    for (std::size_t i = 0; i < checks_.size(); ++i) {
-      if (checks_[i].verdict != Verdict::Wrong && checks_[i].verdict != Verdict::Undecided)
-        continue;
-      const auto k = static_cast<Eigen::Index>(i);
-      if (is_slope_of(left[k], i) != is_slope_of(right[k], i)) checks_[i].verdict = Verdict::Kink;
-    }
-  }
-  bool is_slope_of(double side, std::size_t i) const {
-    return std::abs(side - derivative(i)) <=
-           kSideTolerance * tolerance_ * scale(derivative(i), side);
-  }
-
-  const F& f_;
-  const Values& derivatives_;
-  double width_;
-  double floor_;
-  double tolerance_;
-  std::vector<DerivativeCheck> checks_;
-};
 
 /// Adds one coordinate's checks: it is set aside if one of its entries is, but counts with those
 /// that are not.
@@ -219,29 +120,68 @@ class PathChecker {
   double root(int j) const { return std::sqrt(check_.q(j, j)); }
   double width(int j) const { return std::min(1.0, 1.0 / (3.0 * root(j))); }
 
+  // ---- By hand ----
+
   void compare_gradient_by_hand(const Linearization& hand) {
     check_.gradient_hand = hand.gradient;
-    const Vector roots = check_.q.diagonal().cwiseSqrt();
-    const Vector difference = (hand.gradient - check_.gradient_jets).cwiseQuotient(roots);
-    const double norm = check_.gradient_jets.cwiseQuotient(roots).norm();
-    Comparison& comparison = result(Quantity::GradientHand);
-    comparison.compared = 1;
-    comparison.error = max_or_infinity(0.0, difference.norm() / (1.0 + norm));
+    const double scale = 1.0 + scaled(check_.gradient_jets).norm();
+    const double error = scaled(hand.gradient - check_.gradient_jets).norm() / scale;
+    double rounding = 0;
+    if (error > tolerance(Quantity::GradientHand))
+      rounding = largest_nearby([&](const Linearization& path) {
+        return scaled(path.gradient - check_.gradient_jets).norm() / scale;
+      });
+    add(error, rounding, Quantity::GradientHand);
   }
 
   void compare_jacobian_by_hand(const Linearization& hand) {
     check_.jacobian_hand = jacobian(hand);
-    Comparison& comparison = result(Quantity::JacobianHand);
-    comparison.compared = dimension();
-    if (check_.jacobian_hand.rows() != check_.jacobian_jets.rows()) {
-      comparison.error = kInfinity;
-      return;
-    }
+    const auto error = [&](const Jacobian& other, int j) {
+      return (other.col(j) - check_.jacobian_jets.col(j)).norm() / root(j);
+    };
+    const bool same_rows = check_.jacobian_hand.rows() == check_.jacobian_jets.rows();
     for (int j = 0; j < dimension(); ++j) {
-      const double difference = (check_.jacobian_hand.col(j) - check_.jacobian_jets.col(j)).norm();
-      comparison.error = max_or_infinity(comparison.error, difference / root(j));
+      const double at = same_rows ? error(check_.jacobian_hand, j) : kInfinity;
+      double rounding = 0;
+      if (same_rows && at > tolerance(Quantity::JacobianHand))
+        rounding =
+            largest_nearby([&](const Linearization& path) { return error(jacobian(path), j); });
+      add(at, rounding, Quantity::JacobianHand);
     }
   }
+
+  /// In units of the widths.
+  Vector scaled(const Vector& x) const { return x.cwiseQuotient(check_.q.diagonal().cwiseSqrt()); }
+
+  /// An error that the rounding of the coordinates may have made decides nothing.
+  void add(double error, double rounding, Quantity quantity) {
+    Comparison& comparison = result(quantity);
+    if (std::isfinite(error) && error > tolerance(quantity) && error <= rounding) {
+      ++comparison.undecided;
+      return;
+    }
+    ++comparison.compared;
+    comparison.error = max_or_infinity(comparison.error, error);
+  }
+
+  /// The largest change that moves of a few ulps in all coordinates make of derivatives by jets.
+  template <class Change>
+  double largest_nearby(const Change& change) const {
+    constexpr double kUlps = 4.0 * std::numeric_limits<double>::epsilon();
+    double largest = 0;
+    Linearization path;
+    for (unsigned pattern = 0; pattern < 8; ++pattern) {
+      // Rows of a Hadamard matrix: independent signs.
+      Vector delta(dimension());
+      for (int j = 0; j < dimension(); ++j)
+        delta[j] = std::popcount(pattern & static_cast<unsigned>(j)) % 2 == 0 ? kUlps : -kUlps;
+      functions_.by_jets(scene_, topology_, check_.chart.displaced(delta), {}, path);
+      largest = std::max(largest, change(path));
+    }
+    return largest;
+  }
+
+  // ---- By differences ----
 
   Vector unit(int j, double x) const {
     Vector delta = Vector::Zero(dimension());
@@ -256,9 +196,10 @@ class PathChecker {
         return Values(Values::Constant(1, -contribution(scene_, topology_, moved).log_target));
       };
       const Values derivative = Values::Constant(1, check_.gradient_jets[j]);
-      const auto checks = Judge(potential, derivative, width(j), kGradientFloor / width(j),
-                                tolerance(Quantity::GradientRidders))
-                              .run();
+      const auto checks =
+          DerivativeJudge(potential, derivative, width(j), kGradientFloor / width(j),
+                          tolerance(Quantity::GradientRidders))
+              .run();
       check_.gradient.push_back(checks.front());
       add_coordinate(checks, result(Quantity::GradientRidders));
     }
@@ -275,7 +216,8 @@ class PathChecker {
       const auto f = [&](double x) { return residuals(unit(j, x)); };
       const Values derivatives = check_.jacobian_jets.col(j);
       check_.jacobian.push_back(
-          Judge(f, derivatives, width(j), root(j), tolerance(Quantity::JacobianRidders)).run());
+          DerivativeJudge(f, derivatives, width(j), root(j), tolerance(Quantity::JacobianRidders))
+              .run());
       add_coordinate(check_.jacobian.back(), comparison);
     }
   }
@@ -288,11 +230,15 @@ class PathChecker {
     return q.selfadjointView<Eigen::Lower>();
   }
   Matrix slope(int j, double h) const { return (q_at(j, h) - q_at(j, -h)) / (2.0 * h); }
-  /// Difference of the slopes from both sides.
-  Matrix gap(int j, double h) const {
-    return (4.0 * (q_at(j, h) + q_at(j, -h)) - q_at(j, 2.0 * h) - q_at(j, -2.0 * h) -
-            6.0 * q_at(j, 0.0)) /
-           (2.0 * h);
+  /// Difference of the slopes of Q from both sides at the step h, h Q'' where it is smooth.
+  Matrix bend(int j, double h) const { return (q_at(j, h) + q_at(j, -h) - 2.0 * q_at(j, 0.0)) / h; }
+  /// What of the bend is none of Q'': the jump of the slope at a kink within h. Two differences, as
+  /// each has a place within h where a kink does not show.
+  Matrix kink(int j, double h) const {
+    const Matrix whole = bend(j, h);
+    return (whole - 4.0 * bend(j, h / 4.0))
+        .cwiseAbs()
+        .cwiseMax((whole - 16.0 * bend(j, h / 16.0)).cwiseAbs());
   }
   /// |P| sum_j |M_j| |P| e_j: what errors M_j of dQ / d delta_j make of the divergence, at most.
   template <class MatrixOf>
@@ -322,8 +268,8 @@ class PathChecker {
     });
     const double error = difference.cwiseQuotient(scale).maxCoeff();
     if (error > tolerance(Quantity::Divergence)) {
-      // A kink within the step moves the difference by up to half the gap of the slopes.
-      const auto half_gap = [&](int j) { return Matrix(0.6 * gap(j, step(j))); };
+      // A kink within the step moves the difference by up to half the jump of the slope.
+      const auto half_jump = [&](int j) { return Matrix(0.6 * kink(j, step(j))); };
       const auto truncation = [&](int j) {
         return Matrix(1.1 * (slope(j, step(j)) - slope(j, 0.25 * step(j))));
       };
@@ -331,7 +277,7 @@ class PathChecker {
       const auto explains = [&](const auto& errors) {
         return (difference.array() <= (allowed + spread(inverse, errors)).array()).all();
       };
-      comparison.kinks = explains(half_gap) ? 1 : 0;
+      comparison.kinks = explains(half_jump) ? 1 : 0;
       comparison.undecided = comparison.kinks == 0 && explains(truncation) ? 1 : 0;
       if (comparison.kinks + comparison.undecided > 0) return;
     }
@@ -372,7 +318,7 @@ PathCheck check_path(const Scene& scene, const PathTopology& topology,
 }
 
 bool carries_light(double log_target) {
-  return std::isfinite(log_target) && std::exp(log_target) >= std::numeric_limits<double>::min();
+  return std::isfinite(log_target) && log_target > -300.0 * std::log(10.0);
 }
 
 }  // namespace driftlight

@@ -17,8 +17,8 @@ struct LightEnd {
 
   Kind kind = Kind::Area;
   std::uint32_t emitter = 0;
-  Vec3d p{0, 0, 0};  ///< position; of the environment the unit direction toward it
-  Vec3d n{0, 0, 0};  ///< unit normal of an area emitter, on the side that emits
+  Vec3d p{0, 0, 0};       ///< position; of the environment the unit direction toward it
+  Vec3d n{0, 0, 0};       ///< unit normal of an area emitter, on the side that emits
   Rgbd emitted{0, 0, 0};  ///< radiance; of a point emitter its intensity
   /// Of emitter sampling: probability of the emitter, times 1 / area or the density of the
   /// direction.
@@ -37,7 +37,7 @@ std::optional<LightEnd> light_end_toward(const Scene& scene, const Vec3d& direct
 
 /// The edge from a surface point to a light end; 1 / r^2 and the cosine are 1 where there are none.
 struct LightEdge {
-  Vec3d direction;   ///< unit, away from the surface
+  Vec3d direction;  ///< unit, away from the surface
   double inverse_r2;
   double cosine;  ///< at the light end; not positive on the dark side
 };

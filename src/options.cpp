@@ -112,6 +112,8 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
              "probability of an independent proposal"),
       choice("large_steps", options.large_steps, std::array<std::string_view, 2>{"path", "bdpt"},
              "where independent proposals come from: the sensor, or both ends"),
+      choice("direct", options.direct, std::array<std::string_view, 2>{"chain", "apart"},
+             "paths of 1 and 2 edges: by the chains, or by a path tracer in a pass of its own"),
       number("chains", options.chains, Range<int>{1, 1000000},
              "independent chains; the image depends on it, not on the threads"),
       number("bootstrap", options.bootstrap, Range<int>{1, 1000000000},

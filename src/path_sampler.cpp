@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "driftlight/path_sampler.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -214,10 +215,11 @@ std::optional<Sample> connect(const Scene& scene, CameraPart& part, const LightP
 
 }  // namespace
 
-PathSampler::PathSampler(const Scene& scene, int max_depth, LargeSteps large_steps)
-    : scene_(scene), max_depth_(max_depth), first_of_length_{0} {
+PathSampler::PathSampler(const Scene& scene, int max_depth, LargeSteps large_steps, int min_depth)
+    : scene_(scene), first_of_length_{0} {
   for (int n = 1; n <= max_depth; ++n) {
     first_of_length_.push_back(entry_count());
+    if (n < min_depth) continue;
     const int most = large_steps == LargeSteps::Bdpt ? n : std::min(n - 1, 1);
     for (int s = 0; s <= most; ++s) strategies_.push_back({n, s});
   }
@@ -233,11 +235,17 @@ void PathSampler::learn(const std::vector<RunningMean>& weights) {
     spread += std::sqrt(w.sum_of_squares);
   }
   if (!(energy > 0.0)) return;
+  const auto from_sensor = std::count_if(strategies_.begin(), strategies_.end(),
+                                         [](const Strategy& e) { return e.light_vertices <= 1; });
   std::vector<double> probabilities;
   probabilities.reserve(weights.size());
-  for (const RunningMean& w : weights)
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    const RunningMean& w = weights[i];
+    double floor = 0.05 / static_cast<double>(weights.size());
+    if (strategies_[i].light_vertices <= 1) floor += 0.05 / static_cast<double>(from_sensor);
     probabilities.push_back(0.45 * w.sum / energy + 0.45 * std::sqrt(w.sum_of_squares) / spread +
-                            0.1 / static_cast<double>(weights.size()));
+                            floor);
+  }
   table_ = DiscreteDistribution(probabilities);
 }
 
@@ -259,11 +267,13 @@ std::optional<PathSampler::Sample> PathSampler::sample(Rng& rng) const {
 
 double PathSampler::log_density(const PathTopology& topology,
                                 const PathCoordinates& coordinates) const {
-  const int n = topology.length();
-  if (n > max_depth_) return -std::numeric_limits<double>::infinity();
+  const auto n = static_cast<std::size_t>(topology.length());
+  const bool too_long = n + 1 >= first_of_length_.size();
+  if (too_long || first_of_length_[n] == first_of_length_[n + 1])
+    return -std::numeric_limits<double>::infinity();
   const StrategyDensities q = strategy_densities(scene_, topology, coordinates);
-  const int first = first_of_length_[static_cast<std::size_t>(n)];
-  const int end = first_of_length_[static_cast<std::size_t>(n) + 1];
+  const int first = first_of_length_[n];
+  const int end = first_of_length_[n + 1];
   double sum = 0;
   for (int entry = first; entry < end; ++entry)
     sum += table_.probability(entry) * q.by_light_vertices[static_cast<std::size_t>(entry - first)];

@@ -7,11 +7,14 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "driftlight/bootstrap.h"
 #include "driftlight/chain.h"
+#include "driftlight/error.h"
 #include "driftlight/film.h"
+#include "path_tracer.h"
 #include "stopwatch.h"
 
 namespace driftlight {
@@ -42,83 +45,206 @@ LangevinStatistics& LangevinStatistics::operator+=(const LangevinStatistics& oth
 
 namespace {
 
-/// Runs all chains in rounds, each chain the same number of mutations, until the work or the time
-/// is used up.
-class ChainRunner {
+constexpr int kDirectDepth = 2;
+
+/// The pass of direct light beside the chains.
+class DirectPass {
  public:
-  ChainRunner(std::vector<std::unique_ptr<Chain>>& chains, const RenderOptions& render)
-      : chains_(chains), render_(render) {}
+  DirectPass(const Scene& scene, int max_depth, std::uint64_t seed)
+      : sums_(scene, std::min(kDirectDepth, max_depth), seed) {}
+
+  void pass() {
+    const Stopwatch watch;
+    sums_.pass(passes_++);
+    seconds_ += watch.seconds();
+  }
+  /// Sets the ratio of its time to that of the chains, given their mean luminance. With A / t_d +
+  /// B / t_c the sum of the squared errors, t_d / t_c = sqrt(A / B): the ratio of the brightnesses
+  /// times that of the noise of one sample, about 1 / 4 as a chain needs some ten mutations for
+  /// what an independent sample gives.
+  void set_share(double chain_mean) {
+    ratio_ = chain_mean > 0.0 ? std::clamp(0.25 * mean() / chain_mean, 0.02, 2.0) : 2.0;
+  }
+  double ratio() const { return ratio_; }
+
+  /// Mean luminance so far.
+  double mean() const {
+    const Image image = sums_.image(passes_);
+    double sum = 0;
+    for (std::size_t i = 0; i < image.rgb.size(); ++i)
+      sum += kLuminance[static_cast<Eigen::Index>(i % 3)] * static_cast<double>(image.rgb[i]);
+    return 3.0 * sum / static_cast<double>(image.rgb.size());
+  }
+  /// Adds what it has rendered.
+  void finish(LangevinResult& result) const {
+    const Image own = sums_.image(passes_);
+    for (std::size_t i = 0; i < own.rgb.size(); ++i) result.image.rgb[i] += own.rgb[i];
+    result.statistics.direct_mean = mean();
+    result.statistics.direct_samples_per_pixel = static_cast<double>(passes_);
+    result.statistics.direct_seconds = seconds_;
+  }
+  std::uint64_t passes() const { return passes_; }
+  double seconds() const { return seconds_; }
+
+ private:
+  PixelSums sums_;
+  std::uint64_t passes_ = 0;
+  double seconds_ = 0;
+  double ratio_ = 0;
+};
+
+/// Runs all chains in rounds, each chain the same number of mutations, and passes of direct light
+/// between them, until the work or the time is used up. Either may be missing.
+class Runner {
+ public:
+  Runner(std::vector<std::unique_ptr<Chain>>& chains, DirectPass* direct,
+         const RenderOptions& render, double mutations_per_pixel, double pixels)
+      : chains_(chains),
+        direct_(direct),
+        render_(render),
+        mutations_(static_cast<std::uint64_t>(
+            std::ceil(std::max(1.0, mutations_per_pixel * pixels /
+                                        std::max(1.0, static_cast<double>(chains.size())))))),
+        passes_(direct != nullptr ? static_cast<std::uint64_t>(std::ceil(
+                                        std::max(1.0, direct->ratio() * mutations_per_pixel)))
+                                  : 0) {}
 
   /// True if it was stopped early.
-  bool run(std::uint64_t mutations_per_chain) {
-    std::uint64_t done = 0;
+  bool run() {
     while (true) {
       if (render_.stop != nullptr && render_.stop->load()) return true;
       const double elapsed = watch_.seconds();
-      const double fraction =
-          render_.time ? elapsed / *render_.time
-                       : static_cast<double>(done) / static_cast<double>(mutations_per_chain);
+      const double fraction = render_.time ? elapsed / *render_.time : work_done();
       if (render_.progress) render_.progress({std::min(fraction, 1.0), elapsed});
-      if (fraction >= 1.0) break;
-      std::uint64_t round = next_round(done, elapsed);
-      if (!render_.time) round = std::min(round, mutations_per_chain - done);
-      tbb::parallel_for(std::size_t{0}, chains_.size(),
-                        [&](std::size_t i) { chains_[i]->run(round); });
-      done += round;
+      if (fraction >= 1.0) return false;
+      if (direct_is_due(elapsed))
+        direct_->pass();
+      else
+        round(elapsed);
     }
-    return false;
   }
 
  private:
+  double work_done() const {
+    const double chains =
+        chains_.empty() ? 1.0 : static_cast<double>(done_) / static_cast<double>(mutations_);
+    if (direct_ == nullptr) return chains;
+    return std::min(chains, static_cast<double>(direct_->passes()) / static_cast<double>(passes_));
+  }
+
+  bool direct_is_due(double elapsed) const {
+    if (direct_ == nullptr) return false;
+    if (chains_.empty()) return true;
+    if (!render_.time) return direct_->passes() < passes_;
+    return direct_->seconds() < direct_->ratio() / (1.0 + direct_->ratio()) * elapsed;
+  }
+
+  void round(double elapsed) {
+    const Stopwatch watch;
+    std::uint64_t mutations = next_round(elapsed);
+    if (!render_.time) mutations = std::min(mutations, mutations_ - done_);
+    tbb::parallel_for(std::size_t{0}, chains_.size(),
+                      [&](std::size_t i) { chains_[i]->run(mutations); });
+    done_ += mutations;
+    seconds_ += watch.seconds();
+  }
+
   /// Mutations that take about a tenth of a second, or what is left of the time.
-  std::uint64_t next_round(std::uint64_t done, double elapsed) const {
-    if (done == 0) return 16;
+  std::uint64_t next_round(double elapsed) const {
+    if (done_ == 0) return 16;
     double seconds = 0.1;
     if (render_.time) seconds = std::min(seconds, *render_.time - elapsed);
-    const double rate = static_cast<double>(done) / std::max(elapsed, 1e-6);
+    const double rate = static_cast<double>(done_) / std::max(seconds_, 1e-6);
     return static_cast<std::uint64_t>(
-        std::clamp(rate * seconds, 1.0, 16.0 * static_cast<double>(done)));
+        std::clamp(rate * seconds, 1.0, 16.0 * static_cast<double>(done_)));
   }
 
   std::vector<std::unique_ptr<Chain>>& chains_;
+  DirectPass* direct_;
   const RenderOptions& render_;
+  std::uint64_t mutations_;  ///< of each chain, if no time is given
+  std::uint64_t passes_;     ///< of direct light, if no time is given
+  std::uint64_t done_ = 0;
+  double seconds_ = 0;
   Stopwatch watch_;
+};
+
+/// The chains with what they are started from.
+struct Chains {
+  std::optional<PathSampler> sampler;
+  RunningMean weights;  ///< f / q of the bootstrap
+  std::vector<std::unique_ptr<Chain>> all;
+  std::vector<GradientProbe> probes;  ///< of each, if gradients are checked
+
+  /// No chains if paths of min_depth edges and more carry no light.
+  Chains(const Scene& scene, const LangevinOptions& options, const RenderOptions& render,
+         int min_depth, Film& film) {
+    if (min_depth > options.max_depth) return;
+    sampler.emplace(scene, options.max_depth, options.large_steps, min_depth);
+    const Bootstrap bootstrap(*sampler, scene, options.bootstrap, render.seed);
+    weights = bootstrap.weights();
+    if (!(weights.sum > 0.0)) return;
+    for (const PathSampler::Sample& start : bootstrap.resample(options.chains)) {
+      const auto index = static_cast<std::uint64_t>(all.size());
+      all.push_back(std::make_unique<Chain>(scene, *sampler, options, film, start,
+                                            Rng(render.seed, Stream::Chain, index), render.layers));
+    }
+    if (!render.check_gradients) return;
+    for (std::uint64_t i = 0; i < all.size(); ++i)
+      probes.emplace_back(scene, options.kernel, render.seed, i);
+    for (std::size_t i = 0; i < all.size(); ++i) all[i]->observe(probes[i]);
+  }
+
+  GradientTable gradient_check() const {
+    GradientTable table;
+    for (const GradientProbe& probe : probes)
+      for (const CheckedPath& path : probe.paths()) table.add(path);
+    return table;
+  }
+
+  /// Statistics in the order of the chains: the same for any number of threads.
+  LangevinStatistics finish() {
+    LangevinStatistics sum;
+    for (const auto& chain : all) {
+      chain->flush();
+      sum += chain->statistics();
+      weights += chain->weights();
+    }
+    sum.b = weights.mean();
+    sum.b_error = all.empty() ? 0.0 : weights.error();
+    return sum;
+  }
 };
 
 LangevinResult run_langevin(const Scene& scene, const LangevinOptions& options,
                             const RenderOptions& render, double mutations_per_pixel) {
-  const PerspectiveCamera& camera = scene.camera();
+  const double pixels = scene.camera().pixel_count();
   Stopwatch watch;
-  PathSampler sampler(scene, options.max_depth, options.large_steps);
-  const Bootstrap bootstrap(sampler, scene, options.bootstrap, render.seed);
-  Film film(camera.film_width, camera.film_height);
-  std::vector<std::unique_ptr<Chain>> chains;
-  for (const PathSampler::Sample& start : bootstrap.resample(options.chains)) {
-    const auto index = static_cast<std::uint64_t>(chains.size());
-    chains.push_back(std::make_unique<Chain>(scene, sampler, options, film, start,
-                                             Rng(render.seed, Stream::Chain, index),
-                                             render.layers));
+  const bool apart = options.direct == DirectLight::Apart;
+  Film film(scene.camera().film_width, scene.camera().film_height);
+  Chains chains(scene, options, render, apart ? kDirectDepth + 1 : 1, film);
+  const double bootstrap_seconds = watch.restart();
+  std::optional<DirectPass> direct;
+  if (apart) {
+    direct.emplace(scene, options.max_depth, render.seed);
+    direct->pass();
+    direct->set_share(chains.weights.mean());
   }
+  if (chains.all.empty() && !(direct && direct->mean() > 0.0))
+    throw InputError("no path from the sensor to an emitter carries light");
+  const bool stopped =
+      Runner(chains.all, direct ? &*direct : nullptr, render, mutations_per_pixel, pixels).run();
+
   LangevinResult result;
   LangevinStatistics& statistics = result.statistics;
-  statistics.bootstrap_seconds = watch.restart();
-  const double mutations = mutations_per_pixel * camera.pixel_count();
-  const auto per_chain =
-      static_cast<std::uint64_t>(std::ceil(std::max(1.0, mutations / options.chains)));
-  statistics.stopped = ChainRunner(chains, render).run(per_chain);
-
-  // Sums in the order of the chains: the same for any number of threads.
-  RunningMean weights = bootstrap.weights();
-  for (const auto& chain : chains) {
-    chain->flush();
-    statistics += chain->statistics();
-    weights += chain->weights();
-  }
-  statistics.b = weights.mean();
-  statistics.b_error = weights.error();
+  statistics = chains.finish();
+  if (render.check_gradients) result.gradient_check = chains.gradient_check();
+  statistics.stopped = stopped;
+  statistics.bootstrap_seconds = bootstrap_seconds;
   statistics.render_seconds = watch.seconds();
   const double count = std::max(1.0, static_cast<double>(statistics.mutations));
-  result.image = film.develop(statistics.b * camera.pixel_count() / count);
+  result.image = film.develop(statistics.b * pixels / count);
+  if (direct) direct->finish(result);
   return result;
 }
 

@@ -36,24 +36,22 @@ void SampleFilm::merge(std::size_t tasks) {
   }
 }
 
-Image SampleFilm::image(std::uint64_t passes) const {
+Image SampleFilm::image(double passes) const {
   Image result(camera_.film_width, camera_.film_height);
-  const double scale = passes > 0 ? 1.0 / static_cast<double>(passes) : 0.0;
+  const double scale = passes > 0.0 ? 1.0 / passes : 0.0;
   for (std::size_t i = 0; i < sums_.size(); ++i)
     for (int c = 0; c < 3; ++c)
       result.rgb[3 * i + static_cast<std::size_t>(c)] = static_cast<float>(sums_[i][c] * scale);
   return result;
 }
 
-Layers SampleFilm::layers(const std::vector<std::string>& names, std::uint64_t passes) const {
-  Layers result{.width = camera_.film_width,
-                .height = camera_.film_height,
-                .names = {},
-                .values = {}};
+Layers SampleFilm::layers(const std::vector<std::string>& names, double passes) const {
+  Layers result{
+      .width = camera_.film_width, .height = camera_.film_height, .names = {}, .values = {}};
   for (const std::string& name : names)
     for (const char* channel : {".R", ".G", ".B"}) result.names.push_back(name + channel);
   result.values.reserve(3 * layers_.size());
-  const double scale = passes > 0 ? 1.0 / static_cast<double>(passes) : 0.0;
+  const double scale = passes > 0.0 ? 1.0 / passes : 0.0;
   for (std::size_t pixel = 0; pixel < sums_.size(); ++pixel)
     for (std::size_t layer = 0; layer < names.size(); ++layer)
       for (int c = 0; c < 3; ++c)

@@ -11,9 +11,7 @@
 
 #include "driftlight/image.h"
 #include "driftlight/random.h"
-#include "driftlight/render.h"
 #include "driftlight/sensor.h"
-#include "stopwatch.h"
 
 namespace driftlight {
 
@@ -34,9 +32,9 @@ class SampleFilm {
   void pass(std::uint64_t index, const Sampler& prototype);
 
   /// Means over so many passes.
-  Image image(std::uint64_t passes) const;
+  Image image(double passes) const;
   /// Means of the layers, as channels NAME.R, NAME.G, NAME.B.
-  Layers layers(const std::vector<std::string>& names, std::uint64_t passes) const;
+  Layers layers(const std::vector<std::string>& names, double passes) const;
   /// Contributions that were NaN or infinite, counted as no light.
   std::uint64_t non_finite() const { return non_finite_; }
 
@@ -70,8 +68,7 @@ class SampleFilm {
 
 class SampleFilm::Sink {
  public:
-  Sink(SampleFilm& film, Task& task, std::size_t pixel)
-      : film_(film), task_(task), pixel_(pixel) {}
+  Sink(SampleFilm& film, Task& task, std::size_t pixel) : film_(film), task_(task), pixel_(pixel) {}
 
   void add(const Rgbd& value, int layer = 0) {
     if (value.allFinite())
@@ -113,27 +110,6 @@ void SampleFilm::pass(std::uint64_t index, const Sampler& prototype) {
     });
     merge(tasks);
   }
-}
-
-/// Runs pass(0), pass(1), .. until the work or the time is used up, and fills all but the image.
-template <class Pass>
-PathResult run_passes(const RenderOptions& render, int samples_per_pixel, const Pass& pass) {
-  const Stopwatch watch;
-  PathResult result;
-  std::uint64_t passes = 0;
-  while (true) {
-    const double elapsed = watch.seconds();
-    const double fraction =
-        render.time ? elapsed / *render.time : static_cast<double>(passes) / samples_per_pixel;
-    if (render.progress) render.progress({std::min(fraction, 1.0), elapsed});
-    if (fraction >= 1.0) break;
-    result.stopped = render.stop != nullptr && render.stop->load();
-    if (result.stopped) break;
-    pass(passes++);
-  }
-  result.samples_per_pixel = static_cast<double>(passes);
-  result.render_seconds = watch.seconds();
-  return result;
 }
 
 }  // namespace driftlight

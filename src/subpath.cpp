@@ -7,7 +7,8 @@
 namespace driftlight {
 namespace {
 
-constexpr int kRouletteDepth = 6;
+/// Earlier than in path tracing, since the work grows with the product of the two lengths.
+constexpr int kRouletteDepth = 4;
 
 Rgbd color_of(const ScaledColor<double>& f) { return std::exp(f.log_scale) * f.color; }
 
@@ -51,6 +52,7 @@ Rgbd scattered(const SurfaceHit& x, const Vec3d& wi, const Vec3d& wo) {
 Departure SubpathTracer::leave_sensor(const Vec3d& v) const {
   Departure from;
   from.p = scene_.camera().origin;
+  from.direction = v;
   from.density = std::exp(scene_.camera().log_importance(v));
   from.throughput = Rgbd::Ones();
   from.others = 0.0;
@@ -62,6 +64,7 @@ Departure SubpathTracer::leave_sensor(const Vec3d& v) const {
 Departure SubpathTracer::leave_light(const LightEnd& end, const Emission& emission) const {
   Departure from;
   from.p = end.p;
+  from.direction = emission.direction;
   from.at_infinity = end.kind == LightEnd::Kind::Environment;
   from.cosine = emission.cosine;
   from.density = emission_density(scene_, end, emission.cosine);
@@ -74,8 +77,7 @@ Departure SubpathTracer::leave_light(const LightEnd& end, const Emission& emissi
 SubpathVertex SubpathTracer::arrive(const Departure& from, const SurfaceHit& surface) const {
   SubpathVertex x;
   x.surface = surface;
-  const double inverse_r2 =
-      from.at_infinity ? 1.0 : 1.0 / (surface.at.p - from.p).squaredNorm();
+  const double inverse_r2 = from.at_infinity ? 1.0 : 1.0 / (surface.at.p - from.p).squaredNorm();
   x.density = from.density * std::abs(surface.at.n_g.dot(surface.wi)) * inverse_r2;
   x.others = power_(from.cosine * inverse_r2) * from.others;
   x.previous_connects = from.connects;
@@ -105,6 +107,7 @@ Departure SubpathTracer::depart(Walk walk, const SubpathVertex& x, const BsdfSam
   const double backward = from_sensor ? e.toward_sensor : e.toward_light;
   Departure from;
   from.p = at.at.p;
+  from.direction = next.wo;
   from.cosine = std::abs(at.at.n_g.dot(next.wo));
   from.density = forward;
   double factor = forward > 0.0 ? 1.0 / forward : 0.0;

@@ -38,8 +38,8 @@ enum class Walk : std::uint8_t { FromSensor, FromLight };
 
 /// What the weights know of a vertex that a walk has come to.
 struct Arrival {
-  double density = 0;  ///< p_k per area; at infinity per solid angle
-  double others = 0;   ///< see above
+  double density = 0;              ///< p_k per area; at infinity per solid angle
+  double others = 0;               ///< see above
   bool previous_connects = false;  ///< x_(k-1) is not a delta vertex
 };
 
@@ -55,6 +55,7 @@ struct SubpathVertex : Arrival {
 /// A subpath on its way between two vertices.
 struct Departure {
   Vec3d p{0, 0, 0};          ///< where it comes from
+  Vec3d direction{0, 0, 0};  ///< unit
   bool at_infinity = false;  ///< from the environment: p has no meaning
   double cosine = 1;         ///< |n_g . omega| there; 1 at the sensor, at points and at infinity
   double density = 0;        ///< of the ray, per solid angle; from infinity per area across it
@@ -107,12 +108,6 @@ class SubpathTracer {
   /// ends. The departure that left the scene, if one did.
   std::optional<Departure> trace(Walk walk, const Departure& start, RayFollower follower,
                                  int max_size, Rng& rng, Subpath& subpath) const;
-
-  /// S_k of the end of a subpath, for `from_beyond` = d_k and `backward` = q_k.
-  double others(const Arrival& x, double from_beyond, double backward) const {
-    return power_(from_beyond / x.density) *
-           (power_(backward) * x.others + (x.previous_connects ? 1.0 : 0.0));
-  }
 
  private:
   const Scene& scene_;

@@ -104,7 +104,7 @@ struct Mistake {
 const std::vector<Mistake> kRenderMistakes{
     {{"missing.xml"}, {"missing.xml"}},
     {{"broken.xml"}, {"broken.xml:"}},
-    {{"scene.xml", "--integrator", "photons"}, {"'photons'", "langevin", "path"}},
+    {{"scene.xml", "--integrator", "photons"}, {"'photons'", "langevin", "path", "bdpt", "light"}},
     {{"scene.xml", "--set", "speed=1"}, {"'speed'", "drift", "epsilon"}},
     {{"scene.xml", "--set", "drift=sideways"}, {"drift", "'sideways'", "none|gradient|full"}},
     {{"scene.xml", "--set", "epsilon=-1"}, {"epsilon", "'-1'", "> 0"}},
@@ -128,6 +128,8 @@ const std::vector<Mistake> kRenderMistakes{
     {{"scene.xml", "--spp", "4"}, {"--spp", "path", "--mutations-per-pixel"}},
     {{"scene.xml", "--integrator", "path", "--mutations-per-pixel", "4"},
      {"--mutations-per-pixel", "langevin", "--spp"}},
+    {{"scene.xml", "--integrator", "bdpt", "--mutations-per-pixel", "4"},
+     {"--mutations-per-pixel", "bdpt", "--spp"}},
     {{"scene.xml", "--time", "1", "--mutations-per-pixel", "4"}, {"only one", "--time"}},
     {{"scene.xml", "--integrator", "path", "--time", "1", "--spp", "4"}, {"only one", "--spp"}},
     {{"scene.xml", "-v", "-q"}, {"-v", "-q"}},
@@ -211,7 +213,8 @@ TEST_F(Cli, InfoCountsTheSceneAndListsTheIntegrators) {
   const Outcome integrators = run({"info", "--integrators"});
   EXPECT_EQ(integrators.exit_code, 0) << integrators.err;
   for (const char* part :
-       {"langevin: ", "path: ", "drift", "none|gradient|full", "epsilon", "max_depth", "doi"})
+       {"langevin: ", "path: ", "bdpt: ", "light: ", "drift", "none|gradient|full", "epsilon",
+        "balance|power", "max_depth", "doi"})
     EXPECT_NE(integrators.out.find(part), std::string::npos) << part << integrators.out;
 }
 
@@ -240,8 +243,10 @@ TEST_F(Cli, DiffPrintsTheFigures) {
 
 TEST_F(Cli, RendersIntoEveryFileThatWasAskedFor) {
   const Outcome outcome =
-      run({"render", "scene.xml", "-o", "a.exr", "-o", "a.png", "-oa.pfm", "--stats", "s.json",
-           "--mutations-per-pixel", "20", "--set", "drift=full", "-t", "2", "--seed", "5", "-v"});
+      run({"render", "scene.xml", "-o",         "a.exr",  "-o",
+           "a.png",  "-oa.pfm",   "--stats",    "s.json", "--mutations-per-pixel",
+           "20",     "--set",     "drift=full", "--set",  "direct=chain",
+           "-t",     "2",         "--seed",     "5",      "-v"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(files(), (std::set<std::string>{"a.exr", "a.pfm", "a.png", "s.json", "scene.xml"}));
   const Image image = read_image(folder() / "a.exr");
@@ -322,6 +327,8 @@ TEST_F(Cli, TheSameSeedGivesTheSameBytesOnAnyNumberOfThreads) {
   const std::vector<std::vector<std::string>> integrators{
       {"--integrator", "langevin", "--mutations-per-pixel", "50"},
       {"--integrator", "path", "--spp", "4"},
+      {"--integrator", "bdpt", "--spp", "4"},
+      {"--integrator", "light", "--spp", "4"},
   };
   for (const auto& integrator : integrators) {
     const auto bytes = [&](const char* threads, const char* seed) {
@@ -341,7 +348,7 @@ TEST_F(Cli, TheSameSeedGivesTheSameBytesOnAnyNumberOfThreads) {
 }
 
 TEST_F(Cli, TimeEndsTheRender) {
-  for (const char* integrator : {"langevin", "path"}) {
+  for (const char* integrator : {"langevin", "path", "bdpt", "light"}) {
     const auto start = std::chrono::steady_clock::now();
     const Outcome outcome = run({"render", "scene.xml", "--integrator", integrator, "--time", "1",
                                  "-o", "a.exr", "--stats", "s.json"});
@@ -356,7 +363,7 @@ TEST_F(Cli, TimeEndsTheRender) {
 
 TEST_F(Cli, ASignalEndsTheRenderWithTheImageSoFar) {
   for (const auto& [integrator, signal] :
-       {std::pair("langevin", SIGINT), std::pair("path", SIGTERM)}) {
+       {std::pair("langevin", SIGINT), std::pair("path", SIGTERM), std::pair("bdpt", SIGINT)}) {
     Process process = on_terminal({"render", "scene.xml", "--integrator", integrator, "--time",
                                    "3600", "-o", "a.exr", "--stats", "s.json"});
     // The bar counts down from an hour: a second has passed.

@@ -16,6 +16,7 @@
 #include "driftlight/render.h"
 #include "driftlight/scene_file.h"
 #include "support/t_test.h"
+#include "support/test_scenes.h"
 
 namespace driftlight {
 namespace {
@@ -76,6 +77,8 @@ void PrintTo(const Work& work, std::ostream* out) { *out << work.scene; }
 struct Configuration {
   const char* name;
   Drift drift;
+  LargeSteps large_steps = LargeSteps::Bdpt;
+  DirectLight direct = DirectLight::Apart;
 };
 
 /// Path-traced tiles of a scene, rendered once for all configurations.
@@ -98,15 +101,20 @@ const std::vector<test::Moments>& traced_tiles(const Work& work) {
 class LangevinEqualsPath : public testing::TestWithParam<Work> {};
 
 /// The means of independent images agree tile by tile: Welch's test, Sidak-corrected at 1 %, for
-/// steps without drift, with the gradient, and with the divergence. All use the constraint matrix.
+/// steps without drift, with the gradient, and with the divergence, large steps from the sensor and
+/// from both ends, direct light apart or by the chains. All use the constraint matrix.
 TEST_P(LangevinEqualsPath, TileMeans) {
   const Work& work = GetParam();
   const LoadedScene loaded = load_small(work.scene);
   const std::vector<test::Moments>& traced = traced_tiles(work);
   for (const Configuration& configuration :
        {Configuration{"brownian", Drift::None}, Configuration{"gradient", Drift::Gradient},
-        Configuration{"divergence", Drift::Full}}) {
+        Configuration{"divergence", Drift::Full},
+        Configuration{"from the sensor", Drift::Gradient, LargeSteps::Path, DirectLight::Chain},
+        Configuration{"chains alone", Drift::None, LargeSteps::Bdpt, DirectLight::Chain}}) {
     LangevinOptions options;
+    options.large_steps = configuration.large_steps;
+    options.direct = configuration.direct;
     options.max_depth = loaded.max_depth.value();
     options.kernel.drift = configuration.drift;
     options.bootstrap = work.bootstrap;
@@ -135,6 +143,95 @@ INSTANTIATE_TEST_SUITE_P(Scenes, LangevinEqualsPath,
                                          Work{"glass_caustic", 1200, 400, 1000000, 0.05},
                                          Work{"small_hole", 400, 400, 200000, 0.08},
                                          Work{"glossy_chain", 600, 300, 400000, 0.12}),
+                         [](const auto& instance) { return std::string(instance.param.scene); });
+
+/// Rough glass and rough metal with coarse interpolated normals on a floor with bent ones, under a
+/// sky with a small sun: shading normals and refraction from both ends, and no smooth surface.
+Scene frosted() {
+  SceneBuilder builder;
+  const auto material = [&](Bsdf bsdf) {
+    return builder.add_material({builder.add_bsdf(std::move(bsdf)), std::nullopt});
+  };
+  const auto white = material(Diffuse{Texture(Rgbd{0.7, 0.6, 0.5})});
+  builder.add_shape(test::quad({-2, 0, 2}, {4, 0, 0}, {0, 0, -4}, false, 0.4), white);
+  const Texture clear(Rgbd{1, 1, 1});
+  const Microfacets rough{Distribution::Beckmann, 0.3};
+  builder.add_shape(test::round_mesh({-0.5, 0.6, 0.3}, 0.5, 6),
+                    material(RoughDielectric{rough, 1.5, clear, clear}));
+  const Microfacets rougher{Distribution::Ggx, 0.4};
+  builder.add_shape(test::round_mesh({0.6, 0.5, -0.2}, 0.45, 5),
+                    material(RoughConductor{rougher, {0.2, 0.9, 1.1}, {3.9, 2.4, 2.2}, clear}));
+  builder.add_shape(test::round_mesh({0.1, 0.3, 1.0}, 0.25, 4), white);
+  builder.set_environment(
+      EnvironmentMap(test::sun_bitmap(32, 16, 60.0F), Eigen::Matrix3d::Identity(), 1.0));
+  PerspectiveCamera camera = test::look_at({0.3, 1.6, 3.0}, {0, 0.4, 0}, 0.5);
+  camera.half_height = 0.375;
+  camera.film_width = 32;
+  camera.film_height = 24;
+  builder.set_camera(camera);
+  return builder.build();
+}
+
+struct BidirectionalWork {
+  const char* scene;
+  int path_samples;  ///< per pixel and run
+  int bdpt_samples;
+  int light_samples;  ///< 0: smooth surfaces hide light from light tracing
+  double resolution;  ///< as in Work
+};
+
+void PrintTo(const BidirectionalWork& work, std::ostream* out) { *out << work.scene; }
+
+class BidirectionalEqualsPath : public testing::TestWithParam<BidirectionalWork> {};
+
+/// The same law for bidirectional path tracing, with both heuristics, and for light tracing.
+TEST_P(BidirectionalEqualsPath, TileMeans) {
+  const BidirectionalWork& work = GetParam();
+  const bool in_code = std::string(work.scene) == "frosted";
+  const LoadedScene loaded = in_code ? LoadedScene{frosted(), 6, {}} : load_small(work.scene);
+  const int depth = loaded.max_depth.value();
+  const auto tiles = [&](std::uint64_t first, const auto& render_with) {
+    return tiles_over_runs([&](std::uint64_t seed) {
+      RenderOptions render;
+      render.seed = first + seed;
+      return render_with(render).image;
+    });
+  };
+  const auto traced = tiles(1000, [&](const RenderOptions& render) {
+    return render_path(loaded.scene, {depth}, render, work.path_samples);
+  });
+  const auto compare = [&](const std::string& name, const std::vector<test::Moments>& sampled) {
+    const double level = test::sidak(0.01, static_cast<int>(sampled.size()));
+    std::vector<double> errors;
+    for (std::size_t i = 0; i < sampled.size(); ++i) {
+      errors.push_back(std::hypot(sampled[i].error(), traced[i].error()) / traced[i].mean());
+      EXPECT_GT(test::welch_p_value(sampled[i], traced[i]), level)
+          << name << ", tile " << i << ": " << sampled[i].mean() << " +- " << sampled[i].error()
+          << ", path " << traced[i].mean() << " +- " << traced[i].error();
+    }
+    std::sort(errors.begin(), errors.end());
+    EXPECT_LT(median(errors), work.resolution) << name;
+    RecordProperty("error_" + name, std::to_string(median(errors)));
+  };
+  for (const MisHeuristic heuristic : {MisHeuristic::Balance, MisHeuristic::Power}) {
+    const bool power = heuristic == MisHeuristic::Power;
+    compare(power ? "power" : "balance", tiles(power ? 100 : 200, [&](const RenderOptions& render) {
+              return render_bdpt(loaded.scene, {depth, heuristic}, render, work.bdpt_samples);
+            }));
+  }
+  if (work.light_samples > 0)
+    compare("light", tiles(300, [&](const RenderOptions& render) {
+              return render_light(loaded.scene, {depth}, render, work.light_samples);
+            }));
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, BidirectionalEqualsPath,
+                         testing::Values(BidirectionalWork{"furnace_sphere", 16, 16, 48, 0.02},
+                                         BidirectionalWork{"cornell_glossy", 96, 24, 96, 0.04},
+                                         BidirectionalWork{"glass_caustic", 200, 48, 0, 0.04},
+                                         BidirectionalWork{"small_hole", 128, 48, 128, 0.08},
+                                         BidirectionalWork{"glossy_chain", 128, 48, 0, 0.12},
+                                         BidirectionalWork{"frosted", 128, 48, 128, 0.04}),
                          [](const auto& instance) { return std::string(instance.param.scene); });
 
 /// A closed sphere of radiance L and albedo rho shows L (1 - rho^n) / (1 - rho) everywhere.

@@ -8,6 +8,7 @@
 #include "driftlight/contribution.h"
 #include "driftlight/film.h"
 #include "driftlight/gradient.h"
+#include "driftlight/gradient_probe.h"
 #include "driftlight/kernel.h"
 #include "driftlight/path_sampler.h"
 #include "driftlight/render.h"
@@ -45,6 +46,9 @@ class Chain {
   Chain(const Scene& scene, const PathSampler& sampler, const LangevinOptions& options, Film& film,
         const PathSampler::Sample& start, Rng rng, StepLayers* layers = nullptr);
 
+  /// Shows the probe each state whose step is prepared from now on.
+  void observe(GradientProbe& probe) { probe_ = &probe; }
+
   /// Runs mutations, each splatting both states with weights 1 - a and a.
   void run(std::uint64_t mutations);
   /// Deposits what the current state has gathered since it was entered.
@@ -61,6 +65,7 @@ class Chain {
   /// Each returns the acceptance probability; none if there is no valid proposal.
   std::optional<double> propose_large();
   std::optional<double> propose_small();
+  void prepare(ChainState& state);
   /// Traces and evaluates proposed(); counts why it fails.
   bool evaluate_proposed();
   /// Counts a small step that starts at current() in the layers.
@@ -78,6 +83,7 @@ class Chain {
   double gathered_ = 0;  ///< weight of the current state not yet splatted
   double scale_ = 0;     ///< of the last small step
   StepLayers* layers_;
+  GradientProbe* probe_ = nullptr;
   LangevinStatistics statistics_;
   RunningMean weights_;
 };

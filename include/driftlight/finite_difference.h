@@ -35,7 +35,10 @@ class RiddersTableau {
       column[j] = (column[j - 1] * factor - last_[j - 1]) / (factor - 1.0);
       const double error =
           std::max(std::abs(column[j] - column[j - 1]), std::abs(column[j] - last_[j - 1]));
-      if (error <= best_.error) best_ = {column[j], error};
+      if (error <= best_.error) {
+        best_ = {column[j], error};
+        best_step_ = i;
+      }
     }
     // Rounding has taken over: smaller steps are worse.
     const bool worse = i > 0 && std::abs(column[i] - last_[i - 1]) >= 2.0 * best_.error;
@@ -44,10 +47,13 @@ class RiddersTableau {
     return !done_;
   }
   const Derivative& best() const { return best_; }
+  /// The smallest step in it is h / 2^best_step.
+  std::size_t best_step() const { return best_step_; }
 
  private:
   std::array<double, kSize> last_{};
   std::size_t count_ = 0;
+  std::size_t best_step_ = 0;
   Derivative best_;
   bool done_ = false;
 };

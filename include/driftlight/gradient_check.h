@@ -120,7 +120,8 @@ PathCheck check_path(const Scene& scene, const PathTopology& topology,
                      const PathCoordinates& coordinates, const CheckSelection& selection = {},
                      const DerivativeFunctions& functions = DerivativeFunctions());
 
-/// True if f is a normal positive number: what a sampler can ever stand on.
+/// True if f > 1e-300. Below, nothing ever comes to the image, and its colour, a product, may have
+/// lost its digits.
 bool carries_light(double log_target);
 
 }  // namespace driftlight

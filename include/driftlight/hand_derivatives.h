@@ -104,8 +104,8 @@ struct Recorder : WalkVisitor<double> {
   void position(const Shape&, const Vec3d& p) { end = p; }
   void scatter(const ScatterEvent<double>& e) {
     Vertex& x = add(e, false);
-    x.cos_o = e.at.n_s.dot(e.wo);
-    x.io = e.wi.dot(e.wo);
+    x.cos_o = driftlight::dot(e.at.n_s, e.wo);
+    x.io = driftlight::dot(e.wi, e.wo);
     if (!want_gradient) return;
     x.factor = Rules::scatter(e.bsdf, x.cos_i, x.cos_o, x.io, e.at.uv, e.scattering);
     color *= x.factor.color;
@@ -145,7 +145,7 @@ struct Recorder : WalkVisitor<double> {
     x.uv = e.at.uv;
     x.length = (from - x.p).dot(x.wi);
     x.hit_cosine = Rules::hit_cosine(e.shape.geometry, from, Vec3d(-x.wi), x.n_g);
-    x.cos_i = e.at.n_s.dot(e.wi);
+    x.cos_i = driftlight::dot(e.at.n_s, e.wi);
     x.scattering = e.scattering;
     x.delta = is_delta;
     x.surface = std::visit(

@@ -55,11 +55,18 @@ enum class LargeSteps {
   Bdpt,  ///< from both ends, with all connections
 };
 
+/// Who renders paths of one and two edges: light seen directly, or after one scattering.
+enum class DirectLight {
+  Chain,  ///< the chains, with all the rest
+  Apart,  ///< a path tracer, in a pass of its own
+};
+
 /// The Langevin sampler of [E63].
 struct LangevinOptions {
   KernelOptions kernel;
   double large_step_probability = 0.2;
   LargeSteps large_steps = LargeSteps::Bdpt;
+  DirectLight direct = DirectLight::Apart;
   /// Independent chains, whatever the number of threads.
   int chains = 128;
   /// Samples that estimate the normalization b and start the chains.

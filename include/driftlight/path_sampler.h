@@ -25,8 +25,9 @@ namespace driftlight {
 class PathSampler {
  public:
   /// All strategies equally likely: of LargeSteps::Path those with s <= 1, but not the connection
-  /// of the sensor itself; of LargeSteps::Bdpt all.
-  PathSampler(const Scene& scene, int max_depth, LargeSteps large_steps = LargeSteps::Path);
+  /// of the sensor itself; of LargeSteps::Bdpt all. Lengths from min_depth to max_depth edges.
+  PathSampler(const Scene& scene, int max_depth, LargeSteps large_steps = LargeSteps::Path,
+              int min_depth = 1);
 
   struct Sample {
     PathTopology topology;
@@ -44,8 +45,8 @@ class PathSampler {
   /// Replaces the table, given the weights f / q by entry of samples from the uniform one. Nearly
   /// half of the attempts go by energy, which gives large steps that are accepted; as many by the
   /// root of the second moment, which minimises the variance of b (Neyman's allocation: what scores
-  /// rarely but heavily needs more attempts than its energy asks for); a tenth is uniform, so that
-  /// nothing becomes impossible.
+  /// rarely but heavily needs more attempts than its energy asks for); a tenth is uniform, half of it
+  /// over s <= 1 alone, which find what no other strategy can, so that nothing becomes impossible.
   void learn(const std::vector<RunningMean>& weights);
 
   /// None if the attempt carries no light for certain.
@@ -56,7 +57,6 @@ class PathSampler {
 
  private:
   const Scene& scene_;
-  int max_depth_;
   std::vector<Strategy> strategies_;
   std::vector<int> first_of_length_;  ///< entry of (n, 0), by n; one past the end at last
   DiscreteDistribution table_;

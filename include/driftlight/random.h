@@ -11,7 +11,15 @@
 namespace driftlight {
 
 /// What a stream of numbers is for; streams of different purpose or index are independent.
-enum class Stream : std::uint64_t { Pilot, Bootstrap, Resampling, Chain, Pixel, Test };
+enum class Stream : std::uint64_t {
+  Pilot,
+  Bootstrap,
+  Resampling,
+  Chain,
+  Pixel,
+  Test,
+  GradientCheck
+};
 
 class Rng {
  public:

@@ -8,6 +8,7 @@
 #include <functional>
 #include <optional>
 
+#include "driftlight/gradient_table.h"
 #include "driftlight/image.h"
 #include "driftlight/options.h"
 #include "driftlight/scene.h"
@@ -35,6 +36,14 @@ struct RenderOptions {
   /// Where the Langevin sampler records its small steps, if not null. The image does not depend on
   /// it, nor on its size.
   StepLayers* layers = nullptr;
+  /// Checks the derivatives that the Langevin sampler uses at a random sample of its states
+  /// (gradient_probe.h). The image does not depend on it.
+  bool check_gradients = false;
+  /// Receives from bidirectional path tracing what each strategy adds to the image, weighted, if
+  /// not null: their sum is the image. Channels sStT.R, sStT.G, sStT.B with S vertices from the
+  /// light and T from the sensor, for all max_depth (max_depth + 3) / 2 - 1 strategies; rendering
+  /// them takes 24 bytes a strategy and pixel.
+  Layers* strategies = nullptr;
 };
 
 /// Why proposals of the small step were rejected.
@@ -63,8 +72,12 @@ struct LangevinStatistics {
   /// Mutations spent at paths of n edges.
   std::array<std::uint64_t, kMaxPathLength + 1> path_length{};
   std::uint64_t mutations = 0;
-  double b = 0;        ///< normalization: mean luminance of the image
+  double b = 0;        ///< normalization: mean luminance of the image by the chains
   double b_error = 0;  ///< its standard error
+  /// Of paths of one and two edges, if they are rendered apart.
+  double direct_mean = 0;  ///< mean luminance
+  double direct_samples_per_pixel = 0;
+  double direct_seconds = 0;  ///< part of render_seconds
   double bootstrap_seconds = 0;
   double render_seconds = 0;
   bool stopped = false;
@@ -75,6 +88,7 @@ struct LangevinStatistics {
 struct LangevinResult {
   Image image;
   LangevinStatistics statistics;
+  std::optional<GradientTable> gradient_check;  ///< if it was asked for
 };
 
 /// Renders with the Langevin sampler ([E63]; large steps and normalization as DESIGN 1.8).
@@ -83,6 +97,7 @@ struct LangevinResult {
 LangevinResult render_langevin(const Scene& scene, const LangevinOptions& options,
                                const RenderOptions& render, double mutations_per_pixel);
 
+/// Of an integrator whose samples are independent.
 struct PathResult {
   Image image;
   double samples_per_pixel = 0;
@@ -95,5 +110,18 @@ struct PathResult {
 /// heuristic (Veach 1997). `samples_per_pixel` is the work if no time is given.
 PathResult render_path(const Scene& scene, const PathOptions& options, const RenderOptions& render,
                        int samples_per_pixel);
+
+/// Renders with bidirectional path tracing (Lafortune and Willems 1993; Veach 1997, ch. 10): for
+/// each sample a subpath from the sensor, one from the light, and all connections between them and
+/// to freshly drawn emitter points. `samples_per_pixel` is the work if no time is given.
+PathResult render_bdpt(const Scene& scene, const BdptOptions& options, const RenderOptions& render,
+                       int samples_per_pixel);
+
+/// Renders with light tracing (Arvo 1986; Dutre, Lafortune and Willems 1993): subpaths from the
+/// light, as many as pixels in each sample, whose vertices connect to the sensor; emitters that
+/// are seen directly come from camera rays. Light that the sensor sees by way of a smooth mirror or
+/// smooth glass cannot be found and is missing.
+PathResult render_light(const Scene& scene, const LightOptions& options,
+                        const RenderOptions& render, int samples_per_pixel);
 
 }  // namespace driftlight

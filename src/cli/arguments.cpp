@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -12,6 +13,8 @@
 #include <string_view>
 #include <system_error>
 #include <type_traits>
+
+#include "driftlight/path.h"
 
 namespace driftlight::cli {
 
@@ -40,6 +43,12 @@ std::pair<std::string, std::string> split_setting(std::string_view flag, const s
   return {text.substr(0, equals), text.substr(equals + 1)};
 }
 
+constexpr std::array<std::pair<Integrator, std::string_view>, 4> kIntegrators{
+    {{Integrator::Langevin, "langevin"},
+     {Integrator::Path, "path"},
+     {Integrator::Bdpt, "bdpt"},
+     {Integrator::Light, "light"}}};
+
 /// The command line as text; its meaning comes afterwards.
 struct Raw {
   std::string scene;
@@ -54,6 +63,12 @@ struct Raw {
   std::string seed = "0";
   std::string statistics;
   std::string layers;
+  std::string strategies;
+  bool check_gradients = false;
+  std::string paths = "20000";
+  std::string max_depth;
+  std::string json_file;
+  std::optional<std::string> replay;
   bool verbose = false;
   bool quiet = false;
   bool integrators = false;
@@ -74,7 +89,8 @@ void declare_render(CLI::App& app, Raw& raw) {
                  "image to write, by its ending: .exr, .pfm, .hdr, .png, ..; repeatable "
                  "(default: the scene's name with .exr, in this folder)")
       ->type_name("FILE");
-  app.add_option("--integrator", raw.integrator, "langevin or path")->capture_default_str();
+  app.add_option("--integrator", raw.integrator, "langevin, path, bdpt or light")
+      ->capture_default_str();
   add_repeatable(app, "-D,--define", raw.defines, "value for $NAME in the scene; repeatable")
       ->type_name("NAME=VALUE");
   add_repeatable(app, "--set", raw.settings,
@@ -85,7 +101,7 @@ void declare_render(CLI::App& app, Raw& raw) {
                  "work of the langevin integrator (default: 100)")
       ->type_name("N");
   app.add_option("--spp", raw.samples_per_pixel,
-                 "work of the path integrator, samples per pixel (default: 64)")
+                 "work of the path, bdpt and light integrators, samples per pixel (default: 64)")
       ->type_name("N");
   app.add_option("-t,--threads", raw.threads, "threads; 0: all")
       ->type_name("N")
@@ -98,8 +114,32 @@ void declare_render(CLI::App& app, Raw& raw) {
                  "write what the small steps of the langevin integrator do in each pixel: "
                  "channels gradient_norm, acceptance, anisotropy, time_step, mutations")
       ->type_name("FILE.exr");
+  app.add_option("--strategies", raw.strategies,
+                 "write what each strategy of the bdpt integrator adds to the image: channels "
+                 "sStT.R, sStT.G, sStT.B with S vertices from the light and T from the sensor")
+      ->type_name("FILE.exr");
+  app.add_flag("--check-gradients", raw.check_gradients,
+               "check the derivatives at a random sample of the states of the langevin integrator");
   app.add_flag("-v,--verbose", raw.verbose, "say more at the end");
   app.add_flag("-q,--quiet", raw.quiet, "say nothing but errors");
+}
+
+void declare_gradcheck(CLI::App& app, Raw& raw) {
+  app.add_option("scene", raw.scene, "Mitsuba scene file (XML)")->required()->type_name("SCENE");
+  add_repeatable(app, "-D,--define", raw.defines, "value for $NAME in the scene; repeatable")
+      ->type_name("NAME=VALUE");
+  app.add_option("--paths", raw.paths, "paths to check")->type_name("N")->capture_default_str();
+  app.add_option("--max-depth", raw.max_depth, "longest path, in edges (default: as render)")
+      ->type_name("N");
+  app.add_option("-t,--threads", raw.threads, "threads; 0: all")
+      ->type_name("N")
+      ->capture_default_str();
+  app.add_option("--seed", raw.seed, "seed of the random numbers")
+      ->type_name("N")
+      ->capture_default_str();
+  app.add_option("--json", raw.json_file, "write all classes of paths as JSON")->type_name("FILE");
+  app.add_option("--replay", raw.replay, "print all derivatives of one path, by its index")
+      ->type_name("INDEX");
 }
 
 void declare_info(CLI::App& app, Raw& raw) {
@@ -131,10 +171,12 @@ void set_work(const Raw& raw, RenderCommand& command) {
   const int given =
       (raw.time ? 1 : 0) + (raw.mutations_per_pixel ? 1 : 0) + (raw.samples_per_pixel ? 1 : 0);
   if (given > 1) throw UsageError("give only one of --time, --mutations-per-pixel and --spp");
-  if (raw.samples_per_pixel && command.integrator != Integrator::Path)
-    throw UsageError("--spp is for the path integrator; langevin takes --mutations-per-pixel");
+  if (raw.samples_per_pixel && command.integrator == Integrator::Langevin)
+    throw UsageError(
+        "--spp is for the path, bdpt and light integrators; langevin takes --mutations-per-pixel");
   if (raw.mutations_per_pixel && command.integrator != Integrator::Langevin)
-    throw UsageError("--mutations-per-pixel is for the langevin integrator; path takes --spp");
+    throw UsageError(fmt::format(
+        "--mutations-per-pixel is for the langevin integrator; {} takes --spp", raw.integrator));
   if (raw.time) command.time = parse_number("--time", *raw.time, 0.0);
   if (raw.mutations_per_pixel)
     command.mutations_per_pixel =
@@ -143,17 +185,28 @@ void set_work(const Raw& raw, RenderCommand& command) {
     command.samples_per_pixel = parse_number("--spp", *raw.samples_per_pixel, 1);
 }
 
-/// For the langevin integrator, in a format with named channels, and not over an image.
-void set_layers(const Raw& raw, RenderCommand& command) {
-  if (raw.layers.empty()) return;
-  if (command.integrator != Integrator::Langevin)
-    throw UsageError("--layers is for the langevin integrator");
-  const std::filesystem::path file = raw.layers;
+/// The file of a flag that belongs to one integrator: in a format with named channels, and not over
+/// an image. None if the flag was not given.
+std::optional<std::filesystem::path> layers_file(std::string_view flag, const std::string& text,
+                                                 Integrator owner, const RenderCommand& command) {
+  if (text.empty()) return std::nullopt;
+  if (command.integrator != owner)
+    throw UsageError(fmt::format("{} is for the {} integrator", flag, name_of(owner)));
+  const std::filesystem::path file = text;
   if (file.extension() != ".exr" && file.extension() != ".EXR")
-    throw UsageError(fmt::format("--layers is '{}': must end in .exr", raw.layers));
+    throw UsageError(fmt::format("{} is '{}': must end in .exr", flag, text));
   if (std::find(command.outputs.begin(), command.outputs.end(), file) != command.outputs.end())
-    throw UsageError(fmt::format("--layers is '{}': the image goes there", raw.layers));
-  command.layers = file;
+    throw UsageError(fmt::format("{} is '{}': the image goes there", flag, text));
+  return file;
+}
+
+Integrator parse_integrator(const std::string& name) {
+  for (const auto& [integrator, known] : kIntegrators)
+    if (known == name) return integrator;
+  std::vector<std::string_view> names;
+  for (const auto& known : kIntegrators) names.push_back(known.second);
+  throw UsageError(
+      fmt::format("unknown integrator '{}'; the integrators are {}", name, fmt::join(names, ", ")));
 }
 
 RenderCommand render_command(const Raw& raw) {
@@ -161,25 +214,47 @@ RenderCommand render_command(const Raw& raw) {
   command.scene = scene_arguments(raw);
   command.outputs.assign(raw.outputs.begin(), raw.outputs.end());
   if (command.outputs.empty()) command.outputs.emplace_back(command.scene.file.stem() += ".exr");
-  if (raw.integrator == "path")
-    command.integrator = Integrator::Path;
-  else if (raw.integrator != "langevin")
-    throw UsageError(
-        fmt::format("unknown integrator '{}'; the integrators are langevin, path", raw.integrator));
+  command.integrator = parse_integrator(raw.integrator);
   for (const std::string& setting : raw.settings)
     command.settings.push_back(split_setting("--set", setting));
   set_work(raw, command);
   command.threads = parse_number("--threads", raw.threads, 0);
   command.seed = parse_number("--seed", raw.seed, std::uint64_t{0});
   if (!raw.statistics.empty()) command.statistics = raw.statistics;
-  set_layers(raw, command);
+  command.layers = layers_file("--layers", raw.layers, Integrator::Langevin, command);
+  command.strategies = layers_file("--strategies", raw.strategies, Integrator::Bdpt, command);
+  command.check_gradients = raw.check_gradients;
+  if (command.check_gradients && command.integrator != Integrator::Langevin)
+    throw UsageError("--check-gradients is for the langevin integrator");
   if (raw.verbose && raw.quiet) throw UsageError("give only one of -v and -q");
   if (raw.verbose) command.verbosity = Verbosity::Verbose;
   if (raw.quiet) command.verbosity = Verbosity::Quiet;
   return command;
 }
 
+GradcheckCommand gradcheck_command(const Raw& raw) {
+  GradcheckCommand command;
+  command.scene = scene_arguments(raw);
+  command.paths = parse_number("--paths", raw.paths, 1);
+  command.threads = parse_number("--threads", raw.threads, 0);
+  command.seed = parse_number("--seed", raw.seed, std::uint64_t{0});
+  if (!raw.max_depth.empty()) {
+    command.max_depth = parse_number("--max-depth", raw.max_depth, 1);
+    if (*command.max_depth > kMaxPathLength)
+      throw UsageError(fmt::format("--max-depth is '{}': must be an integer from 1 to {}",
+                                   raw.max_depth, kMaxPathLength));
+  }
+  if (!raw.json_file.empty()) command.json = raw.json_file;
+  if (raw.replay) command.replay = parse_number("--replay", *raw.replay, std::uint64_t{0});
+  if (command.json && command.replay) throw UsageError("give only one of --json and --replay");
+  return command;
+}
+
 }  // namespace
+
+std::string_view name_of(Integrator integrator) {
+  return kIntegrators.at(static_cast<std::size_t>(integrator)).second;
+}
 
 Command parse_arguments(int argc, const char* const* argv) {
   Raw raw;
@@ -187,9 +262,12 @@ Command parse_arguments(int argc, const char* const* argv) {
   app.set_version_flag("--version", "driftlight " DRIFTLIGHT_VERSION);
   app.require_subcommand(1);
   CLI::App& render = *app.add_subcommand("render", "render a scene");
+  CLI::App& gradcheck = *app.add_subcommand(
+      "gradcheck", "compare the derivatives of a scene's paths with independent ones");
   CLI::App& info = *app.add_subcommand("info", "what is in a scene, or the integrators");
   CLI::App& diff = *app.add_subcommand("diff", "compare an image with a reference");
   declare_render(render, raw);
+  declare_gradcheck(gradcheck, raw);
   declare_info(info, raw);
   declare_diff(diff, raw);
   try {
@@ -200,6 +278,7 @@ Command parse_arguments(int argc, const char* const* argv) {
     throw UsageError(error.what());
   }
   if (render.parsed()) return render_command(raw);
+  if (gradcheck.parsed()) return gradcheck_command(raw);
   if (diff.parsed()) return DiffCommand{raw.image, raw.reference, raw.json};
   if (raw.integrators == !raw.scene.empty())
     throw UsageError("info takes either a scene or --integrators");

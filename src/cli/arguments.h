@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -21,7 +22,7 @@ class UsageError : public InputError {
   using InputError::InputError;
 };
 
-enum class Integrator { Langevin, Path };
+enum class Integrator { Langevin, Path, Bdpt, Light };
 enum class Verbosity { Quiet, Normal, Verbose };
 
 struct SceneArguments {
@@ -41,8 +42,21 @@ struct RenderCommand {
   int threads = 0;
   std::uint64_t seed = 0;
   std::optional<std::filesystem::path> statistics;
-  std::optional<std::filesystem::path> layers;  ///< ends in .exr
+  std::optional<std::filesystem::path> layers;      ///< ends in .exr
+  std::optional<std::filesystem::path> strategies;  ///< ends in .exr
+  bool check_gradients = false;
   Verbosity verbosity = Verbosity::Normal;
+};
+
+/// driftlight gradcheck
+struct GradcheckCommand {
+  SceneArguments scene;
+  int paths = 20000;
+  std::uint64_t seed = 0;
+  std::optional<int> max_depth;
+  int threads = 0;
+  std::optional<std::filesystem::path> json;
+  std::optional<std::uint64_t> replay;  ///< index of one path, instead of all
 };
 
 /// driftlight info SCENE
@@ -65,8 +79,11 @@ struct PrintCommand {
   std::string text;
 };
 
-using Command =
-    std::variant<RenderCommand, InfoCommand, IntegratorsCommand, DiffCommand, PrintCommand>;
+using Command = std::variant<RenderCommand, GradcheckCommand, InfoCommand, IntegratorsCommand,
+                             DiffCommand, PrintCommand>;
+
+/// As users write it.
+std::string_view name_of(Integrator integrator);
 
 /// Throws UsageError.
 Command parse_arguments(int argc, const char* const* argv);

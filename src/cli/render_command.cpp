@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <optional>
+#include <type_traits>
 #include <utility>
 
 #include "cli/commands.h"
@@ -12,6 +13,7 @@
 #include "cli/print.h"
 #include "cli/progress_bar.h"
 #include "cli/report.h"
+#include "cli/text_file.h"
 #include "driftlight/image.h"
 #include "driftlight/render.h"
 #include "driftlight/scene_file.h"
@@ -38,10 +40,31 @@ PathResult render_with(const Scene& scene, const PathOptions& options, const Ren
   return render_path(scene, options, render, command.samples_per_pixel);
 }
 
+PathResult render_with(const Scene& scene, const BdptOptions& options, const RenderOptions& render,
+                       const RenderCommand& command) {
+  return render_bdpt(scene, options, render, command.samples_per_pixel);
+}
+
+PathResult render_with(const Scene& scene, const LightOptions& options, const RenderOptions& render,
+                       const RenderCommand& command) {
+  return render_light(scene, options, render, command.samples_per_pixel);
+}
+
+Report report_of(const RenderCommand& /*command*/, const LangevinResult& result,
+                 const std::vector<OptionEntry>& options, const RenderOptions& render) {
+  return make_report(result, options, render);
+}
+
+Report report_of(const RenderCommand& command, const PathResult& result,
+                 const std::vector<OptionEntry>& options, const RenderOptions& render) {
+  return make_report(std::string(name_of(command.integrator)), result, options, render);
+}
+
 void check_outputs(const RenderCommand& command) {
   for (const auto& file : command.outputs) check_writable(file);
   if (command.statistics) check_target(*command.statistics);
   if (command.layers) check_target(*command.layers);
+  if (command.strategies) check_target(*command.strategies);
 }
 
 void write_text(const std::filesystem::path& file, const std::string& text) {
@@ -87,16 +110,32 @@ bool apply_settings(const RenderCommand& command, const std::vector<OptionEntry>
   return has_depth;
 }
 
-void write_outputs(const RenderCommand& command, const Image& image, const StepLayers* layers,
+/// A kernel without derivatives has nothing to check.
+template <class Options>
+void check_settings(const RenderCommand& command, const Options& options) {
+  if constexpr (std::is_same_v<Options, LangevinOptions>) {
+    const KernelOptions& kernel = options.kernel;
+    if (command.check_gradients && kernel.drift == Drift::None &&
+        kernel.preconditioner == PreconditionerKind::Identity)
+      throw UsageError(
+          "--check-gradients: drift=none with preconditioner=identity uses no derivatives");
+  }
+}
+
+void write_outputs(const RenderCommand& command, const Image& image, const RenderOptions& render,
                    Report& report, const Talk& talk) {
   const Stopwatch watch;
   for (const auto& file : command.outputs) {
     write_image(file, image, report.metadata);
     report.summary.push_back(fmt::format("wrote {}", file.string()));
   }
-  if (layers != nullptr) {
-    write_layers(*command.layers, layers->develop(), report.metadata);
+  if (render.layers != nullptr) {
+    write_layers(*command.layers, render.layers->develop(), report.metadata);
     report.summary.push_back(fmt::format("wrote {}", command.layers->string()));
+  }
+  if (render.strategies != nullptr) {
+    write_layers(*command.strategies, *render.strategies, report.metadata);
+    report.summary.push_back(fmt::format("wrote {}", command.strategies->string()));
   }
   report.statistics["seconds"]["write"] = watch.seconds();
   if (command.statistics) {
@@ -113,6 +152,7 @@ void render(const RenderCommand& command) {
   Options options;
   const std::vector<OptionEntry> option_entries = entries(options);
   const bool has_depth = apply_settings(command, option_entries);
+  check_settings(command, options);
   check_outputs(command);
 
   const Stopwatch watch;
@@ -129,22 +169,26 @@ void render(const RenderCommand& command) {
   how.threads = command.threads;
   how.seed = command.seed;
   how.time = command.time;
+  how.check_gradients = command.check_gradients;
   how.stop = &stop_on_interrupt();
   std::optional<StepLayers> layers;
   if (command.layers) {
     const PerspectiveCamera& camera = loaded.scene.camera();
     how.layers = &layers.emplace(camera.film_width, camera.film_height);
   }
+  Layers strategies;
+  if (command.strategies) how.strategies = &strategies;
   const auto result = [&] {
     ProgressBar bar(!talk.quiet());
     how.progress = [&](const Progress& progress) { bar.update(progress); };
     return render_with(loaded.scene, options, how, command);
   }();
-  Report report = make_report(result, option_entries, how);
+  Report report = report_of(command, result, option_entries, how);
   if (report.empty) throw RuntimeError("stopped before there was an image; nothing is written");
   if (report.stopped) talk.notice("stopped early: the image holds what was rendered so far");
   report.statistics["seconds"]["load"] = load_seconds;
-  write_outputs(command, result.image, how.layers, report, talk);
+  write_outputs(command, result.image, how, report, talk);
+  if (!report.failure.empty()) throw RuntimeError(report.failure);
 }
 
 }  // namespace
@@ -155,6 +199,10 @@ void run(const RenderCommand& command) {
       return render<LangevinOptions>(command);
     case Integrator::Path:
       return render<PathOptions>(command);
+    case Integrator::Bdpt:
+      return render<BdptOptions>(command);
+    case Integrator::Light:
+      return render<LightOptions>(command);
   }
 }
 

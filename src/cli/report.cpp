@@ -7,6 +7,8 @@
 #include <charconv>
 #include <thread>
 
+#include "cli/gradient_report.h"
+
 namespace driftlight::cli {
 
 namespace {
@@ -82,6 +84,13 @@ std::string path_lengths(const LangevinStatistics& s) {
   return text;
 }
 
+void report_check(const GradientTable& check, Report& report) {
+  report.statistics["gradient_check"] = cli::to_json(check);
+  report.summary.push_back(summary_line(check));
+  const auto failures = check.failures();
+  if (!failures.empty()) report.failure = cli::describe(failures.front());
+}
+
 }  // namespace
 
 Report make_report(const LangevinResult& result, const std::vector<OptionEntry>& options,
@@ -89,16 +98,17 @@ Report make_report(const LangevinResult& result, const std::vector<OptionEntry>&
   const LangevinStatistics& s = result.statistics;
   Report report = common_report("langevin", result.image, options, render);
   report.stopped = s.stopped;
-  report.empty = s.mutations == 0;
+  report.empty = s.mutations == 0 && !(s.direct_samples_per_pixel > 0.0);
   report.metadata["driftlight:b"] = fmt::format("{}", s.b);
   report.metadata["driftlight:mutations"] = fmt::format("{}", s.mutations);
 
   const auto mutations = static_cast<double>(s.mutations);
-  const double rate = per_second(mutations, s.render_seconds);
+  const double rate = per_second(mutations, s.render_seconds - s.direct_seconds);
   report.statistics.update(
       {{"stopped", s.stopped},
        {"b", s.b},
        {"b_error", s.b_error},
+       {"direct", {{"mean", s.direct_mean}, {"samples_per_pixel", s.direct_samples_per_pixel}}},
        {"mutations", s.mutations},
        {"mutations_per_second", rate},
        {"kernels", {{"large_step", to_json(s.large_step)}, {"small_step", to_json(s.small_step)}}},
@@ -109,21 +119,29 @@ Report make_report(const LangevinResult& result, const std::vector<OptionEntry>&
          {"non_finite", s.rejections.non_finite},
          {"hastings", s.rejections.hastings}}},
        {"path_lengths", s.path_length},
-       {"seconds", {{"bootstrap", s.bootstrap_seconds}, {"render", s.render_seconds}}}});
+       {"seconds",
+        {{"bootstrap", s.bootstrap_seconds},
+         {"render", s.render_seconds},
+         {"direct", s.direct_seconds}}}});
   report.summary = {
       fmt::format("langevin: {} x {} pixels, {} mutations ({:.4g} per pixel) in {:.2f} s, {:.4g} "
                   "per second",
                   result.image.width, result.image.height, s.mutations,
                   mutations / pixel_count(result.image), s.render_seconds, rate),
       fmt::format("b = {:.6g} +- {:.2g}", s.b, s.b_error)};
+  if (s.direct_samples_per_pixel > 0.0)
+    report.summary.push_back(
+        fmt::format("direct light: mean {:.6g}, {} samples per pixel in {:.2f} s", s.direct_mean,
+                    s.direct_samples_per_pixel, s.direct_seconds));
   report.details = {describe("large steps", s.large_step), describe("small steps", s.small_step),
                     describe(s.rejections, s.small_step.proposed), path_lengths(s)};
+  if (result.gradient_check) report_check(*result.gradient_check, report);
   return report;
 }
 
-Report make_report(const PathResult& result, const std::vector<OptionEntry>& options,
-                   const RenderOptions& render) {
-  Report report = common_report("path", result.image, options, render);
+Report make_report(const std::string& integrator, const PathResult& result,
+                   const std::vector<OptionEntry>& options, const RenderOptions& render) {
+  Report report = common_report(integrator, result.image, options, render);
   report.stopped = result.stopped;
   report.empty = !(result.samples_per_pixel > 0.0);
   report.metadata["driftlight:samples_per_pixel"] = fmt::format("{}", result.samples_per_pixel);
@@ -136,9 +154,9 @@ Report make_report(const PathResult& result, const std::vector<OptionEntry>& opt
                             {"non_finite", result.non_finite},
                             {"seconds", {{"render", result.render_seconds}}}});
   report.summary = {fmt::format(
-      "path: {} x {} pixels, {:.4g} samples per pixel in {:.2f} s, {:.4g} samples per second",
-      result.image.width, result.image.height, result.samples_per_pixel, result.render_seconds,
-      rate)};
+      "{}: {} x {} pixels, {:.4g} samples per pixel in {:.2f} s, {:.4g} samples per second",
+      integrator, result.image.width, result.image.height, result.samples_per_pixel,
+      result.render_seconds, rate)};
   if (result.non_finite > 0)
     report.summary.push_back(
         fmt::format("{} samples were not finite and count as no light", result.non_finite));

@@ -20,12 +20,13 @@ struct Report {
   std::vector<std::string> details;  ///< lines, for -v
   bool stopped = false;              ///< ended early
   bool empty = false;                ///< ended before there was an image
+  std::string failure;               ///< what went wrong, if anything did
 };
 
 /// `options` are those that were used, with their values.
 Report make_report(const LangevinResult& result, const std::vector<OptionEntry>& options,
                    const RenderOptions& render);
-Report make_report(const PathResult& result, const std::vector<OptionEntry>& options,
-                   const RenderOptions& render);
+Report make_report(const std::string& integrator, const PathResult& result,
+                   const std::vector<OptionEntry>& options, const RenderOptions& render);
 
 }  // namespace driftlight::cli

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The light tracer: subpaths from the light, seen by the sensor at each of their vertices.
+#include <tbb/task_arena.h>
+
+#include "driftlight/render.h"
+#include "pass_loop.h"
+#include "sample_film.h"
+#include "sensor_connection.h"
+
+namespace driftlight {
+namespace {
+
+class LightTracer {
+ public:
+  /// There are no weights: the heuristic does not matter.
+  LightTracer(const Scene& scene, int max_depth)
+      : scene_(scene), tracer_(scene, MisHeuristic::Balance), max_depth_(max_depth) {}
+
+  void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& sink) {
+    sink.add(directly_seen(scene_.camera().direction(film)));
+    const LightEnd end = sample_light_end(scene_, rng);
+    const Emission emission = sample_emission(scene_, end, rng);
+    tracer_.trace(Walk::FromLight, tracer_.leave_light(end, emission),
+                  RayFollower(scene_, emission.origin, emission.start, emission.direction),
+                  max_depth_ - 1, rng, subpath_);
+    for (int i = 0; i < subpath_.size(); ++i) {
+      if (subpath_[i].delta) continue;
+      if (const auto seen = connect_to_sensor(scene_, subpath_[i]))
+        sink.splat(seen->film, seen->value);
+    }
+  }
+
+ private:
+  /// Radiance that emitters send along the camera ray v.
+  Rgbd directly_seen(const Vec3d& v) const {
+    RayFollower follower(scene_, v);
+    const Hit hit = follower.next_hit();
+    const auto end =
+        hit.valid() ? light_end_at(scene_, follower.surface(hit)) : light_end_toward(scene_, v);
+    return end ? end->emitted : Rgbd::Zero();
+  }
+
+  const Scene& scene_;
+  SubpathTracer tracer_;
+  int max_depth_;
+  Subpath subpath_;  ///< kept between samples for its storage only
+};
+
+}  // namespace
+
+PathResult render_light(const Scene& scene, const LightOptions& options,
+                        const RenderOptions& render, int samples_per_pixel) {
+  options.validate();
+  const LightTracer tracer(scene, options.max_depth);
+  SampleFilm film(scene.camera(), render.seed, 0);
+  tbb::task_arena arena(render.threads > 0 ? render.threads : tbb::task_arena::automatic);
+  PathResult result = arena.execute([&] {
+    return run_passes(render, samples_per_pixel,
+                      [&](std::uint64_t index) { film.pass(index, tracer); });
+  });
+  result.image = film.image(result.samples_per_pixel);
+  result.non_finite = film.non_finite();
+  return result;
+}
+
+}  // namespace driftlight
