@@ -255,34 +255,39 @@ class PathChecker {
     check_.exact_divergence = exact_divergence(scene_, topology_, check_.chart);
     const Vector difference = (check_.divergence - check_.exact_divergence).cwiseAbs();
     const Eigen::LLT<Matrix> cholesky(check_.q);
-    if (cholesky.info() != Eigen::Success || !difference.allFinite()) {
-      comparison.undecided = 1;
-      return;
-    }
     const Matrix inverse = cholesky.solve(Matrix::Identity(dimension(), dimension()));
     const Vector roots = check_.q.diagonal().cwiseSqrt();
-    const auto step = [&](int j) { return 1e-4 * width(j); };
     const Vector scale = spread(inverse, [&](int j) {
       const Matrix floor = (kSlopeFloor / width(j)) * roots * roots.transpose();
       return Matrix(slope(j, step(j)).cwiseAbs() + floor);
     });
-    const double error = difference.cwiseQuotient(scale).maxCoeff();
-    if (error > tolerance(Quantity::Divergence)) {
-      // A kink within the step moves the difference by up to half the jump of the slope.
-      const auto half_jump = [&](int j) { return Matrix(0.6 * kink(j, step(j))); };
-      const auto truncation = [&](int j) {
-        return Matrix(1.1 * (slope(j, step(j)) - slope(j, 0.25 * step(j))));
-      };
-      const Vector allowed = tolerance(Quantity::Divergence) * scale;
-      const auto explains = [&](const auto& errors) {
-        return (difference.array() <= (allowed + spread(inverse, errors)).array()).all();
-      };
-      comparison.kinks = explains(half_jump) ? 1 : 0;
-      comparison.undecided = comparison.kinks == 0 && explains(truncation) ? 1 : 0;
-      if (comparison.kinks + comparison.undecided > 0) return;
+    if (cholesky.info() != Eigen::Success || !difference.allFinite() || !scale.allFinite()) {
+      comparison.undecided = 1;
+      return;
     }
     comparison.compared = 1;
-    comparison.error = max_or_infinity(0.0, error);
+    comparison.error = difference.cwiseQuotient(scale).maxCoeff();
+    const double allowed = tolerance(Quantity::Divergence);
+    if (comparison.error > allowed) excuse(inverse, difference - allowed * scale, comparison);
+  }
+
+  /// The step of the differences in divergence.h.
+  double step(int j) const { return 1e-4 * width(j); }
+
+  /// Sets the divergence aside if what it is off too much comes from a kink within the step, which
+  /// moves differences by up to half the jump of the slope, or from their truncation.
+  void excuse(const Matrix& inverse, const Vector& excess, Comparison& comparison) const {
+    const auto explained_by = [&](const auto& errors) {
+      return (excess.array() <= spread(inverse, errors).array()).all();
+    };
+    const auto half_jump = [&](int j) { return Matrix(0.6 * kink(j, step(j))); };
+    const auto truncation = [&](int j) {
+      return Matrix(1.1 * (slope(j, step(j)) - slope(j, 0.25 * step(j))));
+    };
+    const bool at_kink = explained_by(half_jump);
+    if (!at_kink && !explained_by(truncation)) return;
+    comparison = {};
+    ++(at_kink ? comparison.kinks : comparison.undecided);
   }
 
   const Scene& scene_;

@@ -18,8 +18,8 @@ bool is_digit(char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0;
 }  // namespace
 
 double QuantitySummary::set_aside() const {
-  const auto aside = static_cast<double>(kinks + undecided);
-  return aside > 0.0 ? aside / (aside + static_cast<double>(compared)) : 0.0;
+  if (coordinates() == 0) return 0.0;
+  return static_cast<double>(kinks + undecided) / static_cast<double>(coordinates());
 }
 
 void ClassRecord::add(const CheckedPath& path) {
@@ -105,12 +105,13 @@ std::vector<GradientFailure> GradientTable::failures() const {
     failures.push_back({Kind::Error, quantity, name, all.maximum, all.worst});
   }
   for (const Quantity quantity : kQuantities) {
-    if (all_.compared_paths(quantity) == 0) continue;
+    const QuantitySummary all = all_.summary(quantity);
+    if (all.coordinates() == 0) continue;  // not asked for
     for (const auto& [name, record] : features_)
       if (record.paths() >= kSomePaths && record.compared_paths(quantity) == 0)
         failures.push_back({Kind::NotCompared, quantity, name, 0.0});
-    const double set_aside = all_.summary(quantity).set_aside();
-    if (set_aside > kMostSetAside) failures.push_back({Kind::SetAside, quantity, "", set_aside});
+    if (all.coordinates() >= kManyCoordinates && all.set_aside() > kMostSetAside)
+      failures.push_back({Kind::SetAside, quantity, "", all.set_aside()});
   }
   return failures;
 }

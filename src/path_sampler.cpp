@@ -224,28 +224,35 @@ PathSampler::PathSampler(const Scene& scene, int max_depth, LargeSteps large_ste
     for (int s = 0; s <= most; ++s) strategies_.push_back({n, s});
   }
   first_of_length_.push_back(entry_count());
-  table_ = DiscreteDistribution(std::vector<double>(strategies_.size(), 1.0));
+  table_ = DiscreteDistribution(spread(1.0));
+}
+
+/// A probability spread evenly, one half over all entries and the other over s <= 1: these are few,
+/// and find what no other strategy can, light behind mirrors and glass.
+std::vector<double> PathSampler::spread(double probability) const {
+  const auto from_sensor = [](const Strategy& e) { return e.light_vertices <= 1; };
+  const auto count = std::count_if(strategies_.begin(), strategies_.end(), from_sensor);
+  std::vector<double> result;
+  result.reserve(strategies_.size());
+  for (const Strategy& e : strategies_)
+    result.push_back(0.5 * probability *
+                     (1.0 / static_cast<double>(strategies_.size()) +
+                      (from_sensor(e) ? 1.0 / static_cast<double>(count) : 0.0)));
+  return result;
 }
 
 void PathSampler::learn(const std::vector<RunningMean>& weights) {
   double energy = 0;
-  double spread = 0;
+  double spread_total = 0;
   for (const RunningMean& w : weights) {
     energy += w.sum;
-    spread += std::sqrt(w.sum_of_squares);
+    spread_total += std::sqrt(w.sum_of_squares);
   }
   if (!(energy > 0.0)) return;
-  const auto from_sensor = std::count_if(strategies_.begin(), strategies_.end(),
-                                         [](const Strategy& e) { return e.light_vertices <= 1; });
-  std::vector<double> probabilities;
-  probabilities.reserve(weights.size());
-  for (std::size_t i = 0; i < weights.size(); ++i) {
-    const RunningMean& w = weights[i];
-    double floor = 0.05 / static_cast<double>(weights.size());
-    if (strategies_[i].light_vertices <= 1) floor += 0.05 / static_cast<double>(from_sensor);
-    probabilities.push_back(0.45 * w.sum / energy + 0.45 * std::sqrt(w.sum_of_squares) / spread +
-                            floor);
-  }
+  std::vector<double> probabilities = spread(0.1);
+  for (std::size_t i = 0; i < weights.size(); ++i)
+    probabilities[i] +=
+        0.45 * weights[i].sum / energy + 0.45 * std::sqrt(weights[i].sum_of_squares) / spread_total;
   table_ = DiscreteDistribution(probabilities);
 }
 

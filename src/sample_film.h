@@ -45,10 +45,10 @@ class SampleFilm {
     Rgbd value;
   };
   /// Samples in a row of one task, and the most tasks whose splats are kept.
-  static constexpr std::size_t kTask = 256;
-  static constexpr std::size_t kTasks = 512;
+  static constexpr std::size_t kTask = 64;
+  static constexpr std::size_t kTasks = 2048;
 
-  struct Task {
+  struct alignas(64) Task {
     std::vector<Splat> splats;
     std::uint64_t non_finite = 0;
   };
@@ -101,9 +101,11 @@ void SampleFilm::pass(std::uint64_t index, const Sampler& prototype) {
       const std::size_t first = start + i * kTask;
       for (std::size_t pixel = first; pixel < std::min(first + kTask, end); ++pixel) {
         Rng rng(seed_, Stream::Pixel, index * sums_.size() + pixel);
+        const std::size_t x = pixel % width;
+        const std::size_t y = pixel / width;
         const Vec2d jitter = rng.uniform2();
-        const Vec2d film{(static_cast<double>(pixel % width) + jitter.x()) / camera_.film_width,
-                         (static_cast<double>(pixel / width) + jitter.y()) / camera_.film_height};
+        const Vec2d film{(static_cast<double>(x) + jitter.x()) / camera_.film_width,
+                         (static_cast<double>(y) + jitter.y()) / camera_.film_height};
         Sink sink(*this, tasks_[i], pixel);
         sampler.sample(film, rng, sink);
       }

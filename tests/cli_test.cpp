@@ -212,9 +212,8 @@ TEST_F(Cli, InfoCountsTheSceneAndListsTheIntegrators) {
     EXPECT_NE(scene.out.find(part), std::string::npos) << part << " in\n" << scene.out;
   const Outcome integrators = run({"info", "--integrators"});
   EXPECT_EQ(integrators.exit_code, 0) << integrators.err;
-  for (const char* part :
-       {"langevin: ", "path: ", "bdpt: ", "light: ", "drift", "none|gradient|full", "epsilon",
-        "balance|power", "max_depth", "doi"})
+  for (const char* part : {"langevin: ", "path: ", "bdpt: ", "light: ", "drift",
+                           "none|gradient|full", "epsilon", "balance|power", "max_depth", "doi"})
     EXPECT_NE(integrators.out.find(part), std::string::npos) << part << integrators.out;
 }
 

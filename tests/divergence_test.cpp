@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Laws of the divergence: the differences of divergence() against exact second derivatives, which
 /// Jets of Jets give.
+#include "driftlight/divergence.h"
+
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -11,7 +13,6 @@
 #include <vector>
 
 #include "driftlight/constraints.h"
-#include "driftlight/divergence.h"
 #include "driftlight/exact_divergence.h"
 #include "driftlight/gradient.h"
 #include "support/path_classes.h"

@@ -4,12 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "driftlight/gradient_check.h"
 #include "driftlight/hand_derivatives.h"
+#include "driftlight/scene_check.h"
 #include "support/test_scenes.h"
 
 namespace driftlight::test {
@@ -333,6 +335,22 @@ TEST(HandFaults, WrongDivergenceIsCaught) {
     ASSERT_TRUE(caught.found);
     EXPECT_GT(caught.check[Quantity::Divergence].error, tolerance(Quantity::Divergence));
   }
+}
+
+// Law: a divergence that is never a number decides nothing on a path, but fails the scene.
+TEST(HandFaults, MissingDivergenceIsCaught) {
+  DerivativeFunctions functions;
+  functions.divergence = [](const Scene&, const PathTopology&, const Chart& chart) {
+    return Vector(Vector::Constant(chart.dimension(), std::numeric_limits<double>::quiet_NaN()));
+  };
+  const TestScene& test = test_scenes().front();
+  SceneCheckOptions options;
+  options.paths = 50;
+  options.max_depth = test.max_depth;
+  const auto failures = check_scene(test.scene, options, functions).table.failures();
+  ASSERT_FALSE(failures.empty());
+  EXPECT_EQ(failures.front().kind, GradientFailure::Kind::NotCompared);
+  EXPECT_EQ(failures.front().quantity, Quantity::Divergence);
 }
 
 // Law: derivatives that are not numbers never pass.

@@ -52,7 +52,7 @@ std::optional<GivenPath> draw_path(const TestScene& test, Rng& rng) {
   if (last < subpath.size()) {
     for (int i = 0; i <= last; ++i) path.scattering.push_back(subpath[i].surface);
     if (const auto end = light_end_at(scene, path.scattering.back())) {
-      path.v.push_back(-path.scattering.back().wi);
+      path.v.emplace_back(-path.scattering.back().wi);
       path.scattering.pop_back();
       path.end = *end;
     } else {

@@ -31,6 +31,7 @@ struct QuantitySummary {
   double maximum = 0;
   std::uint64_t worst = 0;  ///< index of the path with the maximum
 
+  std::uint64_t coordinates() const { return compared + kinks + undecided; }
   /// Part of the coordinates that was not compared.
   double set_aside() const;
 };

@@ -24,8 +24,9 @@ namespace driftlight {
 /// the balance heuristic.
 class PathSampler {
  public:
-  /// All strategies equally likely: of LargeSteps::Path those with s <= 1, but not the connection
-  /// of the sensor itself; of LargeSteps::Bdpt all. Lengths from min_depth to max_depth edges.
+  /// The strategies are, of LargeSteps::Path, those with s <= 1, but not the connection of the
+  /// sensor itself, equally likely; of LargeSteps::Bdpt all, those with s <= 1 making half of the
+  /// attempts at least. Lengths from min_depth to max_depth edges.
   PathSampler(const Scene& scene, int max_depth, LargeSteps large_steps = LargeSteps::Path,
               int min_depth = 1);
 
@@ -42,11 +43,11 @@ class PathSampler {
 
   int entry_count() const { return static_cast<int>(strategies_.size()); }
   const Strategy& strategy(int entry) const { return strategies_[static_cast<std::size_t>(entry)]; }
-  /// Replaces the table, given the weights f / q by entry of samples from the uniform one. Nearly
+  /// Replaces the table, given the weights f / q by entry of samples from the first one. Nearly
   /// half of the attempts go by energy, which gives large steps that are accepted; as many by the
   /// root of the second moment, which minimises the variance of b (Neyman's allocation: what scores
-  /// rarely but heavily needs more attempts than its energy asks for); a tenth is uniform, half of it
-  /// over s <= 1 alone, which find what no other strategy can, so that nothing becomes impossible.
+  /// rarely but heavily needs more attempts than its energy asks for); a tenth is spread as at
+  /// first, so that nothing becomes impossible.
   void learn(const std::vector<RunningMean>& weights);
 
   /// None if the attempt carries no light for certain.
@@ -56,6 +57,8 @@ class PathSampler {
   double log_density(const PathTopology& topology, const PathCoordinates& coordinates) const;
 
  private:
+  std::vector<double> spread(double probability) const;
+
   const Scene& scene_;
   std::vector<Strategy> strategies_;
   std::vector<int> first_of_length_;  ///< entry of (n, 0), by n; one past the end at last

@@ -32,7 +32,7 @@ std::string quoted(const std::string& text) {
 std::string replay_line(const GradcheckCommand& command, std::uint64_t index) {
   std::string line = "driftlight gradcheck " + quoted(command.scene.file.string());
   for (const auto& [name, value] : command.scene.defines)
-    line += " -D " + quoted(name + "=" + value);
+    line += fmt::format(" -D {}", quoted(fmt::format("{}={}", name, value)));
   if (command.max_depth) line += fmt::format(" --max-depth {}", *command.max_depth);
   return line + fmt::format(" --seed {} --replay {}", command.seed, index);
 }

@@ -111,8 +111,8 @@ void run(const IntegratorsCommand& /*command*/) {
             "Veach 1997)") +
         describe_integrator<BdptOptions>(
             "bdpt",
-            "bidirectional path tracing with all connections (Lafortune and Willems 1993; Veach "
-            "and Guibas 1994, doi 10.1007/978-3-642-87825-1_11; Veach 1997)") +
+            "bidirectional path tracing with all connections (Lafortune and Willems 1993; "
+            "Veach 1997)") +
         describe_integrator<LightOptions>(
             "light",
             "light tracing; what is seen by way of smooth mirrors and glass is missing (Dutre, "
