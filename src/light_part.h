@@ -14,10 +14,10 @@ struct LightPart {
   struct Vertex {
     Vec3d p;
     Hit hit;
-    const Bsdf* bsdf;
+    const Bsdf* bsdf = nullptr;
     Vec3d to_sensor;  ///< direction of the edge that leaves it toward the sensor; not of the last
-    bool delta;
-    Scattering scattering;
+    bool delta = false;
+    Scattering scattering = Scattering::Reflection;
   };
 
   std::uint32_t emitter = 0;

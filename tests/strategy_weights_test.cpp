@@ -132,7 +132,7 @@ std::vector<double> weights_by_walking(const Scene& scene, const GivenPath& path
     if (!possible(path, t)) {
       w = 0;
     } else if (t == n + 1) {
-      SurfaceHit surface;
+      SurfaceHit surface{};
       surface.at = {path.end.p, path.end.n, path.end.n, Vec2d::Zero()};
       surface.wi = -path.v.back();
       surface.bsdf = nullptr;
