@@ -10,12 +10,12 @@ namespace {
 
 /// What the densities need of a scattering vertex x_k, k >= 1.
 struct Vertex {
-  double forward;       ///< C_k
-  double backward;      ///< l_k: density of the direction toward the sensor; of a delta lobe P
-  double cosine_in;     ///< of the edge from the sensor's side
-  double cosine_out;    ///< of v_k
-  double index_ratio2;  ///< (n before / n behind)^2 of a delta lobe
-  double r2;            ///< squared length of the edge from x_{k-1}
+  double forward;     ///< C_k
+  double backward;    ///< l_k: density of the direction toward the sensor; of a delta lobe P
+  double cosine_in;   ///< of the edge from the sensor's side
+  double cosine_out;  ///< of v_k
+  double etendue;     ///< of a delta lobe: n^2 cos d omega dA before it over that behind it
+  double r2;          ///< squared length of the edge from x_{k-1}
   bool delta;
 };
 
@@ -35,7 +35,7 @@ class Recorder : public WalkVisitor<double> {
     x.delta = false;
     x.forward = pdf(e.bsdf, e.surface(), e.wi, e.wo);
     x.backward = pdf(e.bsdf, e.surface(), e.wo, e.wi);
-    x.index_ratio2 = 1.0;
+    x.etendue = 1.0;
   }
   void connect(const ScatterEvent<double>& e) { scatter(e); }
   void delta(const ScatterEvent<double>& e) {
@@ -43,11 +43,13 @@ class Recorder : public WalkVisitor<double> {
     x.delta = true;
     x.forward = delta_probability(e.bsdf, e.surface(), e.wi, e.scattering);
     x.backward = delta_probability(e.bsdf, e.surface(), e.wo, e.scattering);
-    x.index_ratio2 = 1.0;
+    const Vec3d& n_s = e.at.n_s;
+    const Vec3d& n_g = e.at.n_g;
+    x.etendue = std::abs(n_s.dot(e.wi) * n_g.dot(e.wo) / (n_s.dot(e.wo) * n_g.dot(e.wi)));
     if (e.scattering == Scattering::Transmission) {
       const double eta = std::get<Dielectric>(e.bsdf).eta;
-      const double beyond = e.at.n_s.dot(e.wi) > 0.0 ? eta : 1.0 / eta;
-      x.index_ratio2 = 1.0 / (beyond * beyond);
+      const double beyond = n_s.dot(e.wi) > 0.0 ? eta : 1.0 / eta;
+      x.etendue /= beyond * beyond;
     }
   }
   void hit(const AreaEmitter& light, const double& cosine, const double& squared) {
@@ -132,7 +134,7 @@ StrategyDensities strategy_densities(const Scene& scene, const PathTopology& top
     const Vertex& x = vertex(t);
     if (x.delta) {
       if (topology.end == PathEnd::PointConnection && t == n - 1) return result;
-      suffix *= x.backward * x.index_ratio2;
+      suffix *= x.backward * x.etendue;
       continue;
     }
     suffix *= x.cosine_out;

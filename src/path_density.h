@@ -13,7 +13,9 @@
 ///   chain n^2 cos d omega dA is conserved (etendue), so
 ///     p(dA_a | x_b) dA_b / d omega_a = l_b prod P (n_a^2 cos_a) / (n_b^2 cos_b),
 ///   cos_a that of v_a at x_a, cos_b that of the arriving edge at x_b (both geometric), n the
-///   refractive index at the ends of the chain.
+///   refractive index at the ends of the chain. A delta lobe keeps n^2 |n_s.w| d omega about its
+///   shading normal, while areas go by |n_g.w|: where the two normals differ each such vertex adds
+///   |n_s.w_i| |n_g.w_o| / (|n_s.w_o| |n_g.w_i|).
 /// - The connection joins two non-delta vertices: dA_t / d omega_{t-1} = r^2 / cos_t.
 /// Ends: an area emitter has p(x_n) = 1 / area and l_n = cos_n / pi; an environment is drawn by
 /// direction, p(omega), and by the point where the ray crosses a disk of the scene's radius R,
