@@ -24,7 +24,10 @@ namespace {
 std::string kind(const PathTopology& topology) {
   static const std::array<std::string, 4> ends{"hit", "environment", "area connection",
                                                "point connection"};
-  return std::to_string(topology.length()) + " edges, " +
+  const auto end = topology.vertices.begin() + topology.scatter_count;
+  const bool delta =
+      std::any_of(topology.vertices.begin(), end, [](const auto& v) { return v.delta; });
+  return std::to_string(topology.length()) + " edges" + (delta ? " by a delta lobe, " : ", ") +
          ends[static_cast<std::size_t>(topology.end)] + " of emitter " +
          std::to_string(topology.emitter);
 }
@@ -154,42 +157,57 @@ PathSampler sampler_of(const TestScene& test, int light_vertices) {
   return sampler;
 }
 
-// Law: the same for paths from both ends, whatever the number s of vertices on the light's side. A
-// path with s = 0, 1, 2, .. light vertices is as dense as the paths that come with another s.
-TEST(PathSampler, DensitiesOfAllStrategiesAgree) {
-  const int count = 60000;
-  int kinds = 0;
-  std::vector<double> p_values;
-  for (const TestScene& test : test_scenes()) {
-    const PathSampler uniform(test.scene, test.max_depth, LargeSteps::Bdpt);
-    std::map<std::string, double> plain;
-    draw(uniform, 120, count, [&](const std::optional<PathSampler::Sample>& path) {
-      if (path && std::isfinite(log_target(test, *path))) plain[kind(path->topology)] += 1.0;
+/// Adds a p-value for each kind of path of a scene and each s: whether paths drawn with a
+/// preference for s come as often, weighted, as with the uniform table.
+void compare_strategies(const TestScene& test, int count, std::vector<double>& p_values) {
+  const PathSampler uniform(test.scene, test.max_depth, LargeSteps::Bdpt);
+  std::map<std::string, double> plain;
+  draw(uniform, 120, count, [&](const std::optional<PathSampler::Sample>& path) {
+    if (path && std::isfinite(log_target(test, *path))) plain[kind(path->topology)] += 1.0;
+  });
+  for (int s = 0; s <= test.max_depth; ++s) {
+    const PathSampler favouring = sampler_of(test, s);
+    std::map<std::string, std::array<double, 2>> weighted;
+    draw(favouring, 121, count, [&](const std::optional<PathSampler::Sample>& path) {
+      if (!path || !std::isfinite(log_target(test, *path))) return;
+      const double ratio = std::exp(uniform.log_density(path->topology, path->coordinates) -
+                                    favouring.log_density(path->topology, path->coordinates));
+      EXPECT_LT(ratio, 8.0);
+      auto& sums = weighted[kind(path->topology)];
+      sums[0] += ratio;
+      sums[1] += ratio * ratio;
     });
-    for (int s = 0; s <= test.max_depth; ++s) {
-      const PathSampler favouring = sampler_of(test, s);
-      std::map<std::string, std::array<double, 2>> weighted;
-      draw(favouring, 121, count, [&](const std::optional<PathSampler::Sample>& path) {
-        if (!path || !std::isfinite(log_target(test, *path))) return;
-        const double ratio = std::exp(uniform.log_density(path->topology, path->coordinates) -
-                                      favouring.log_density(path->topology, path->coordinates));
-        EXPECT_LT(ratio, 8.0);
-        auto& sums = weighted[kind(path->topology)];
-        sums[0] += ratio;
-        sums[1] += ratio * ratio;
-      });
-      for (const auto& [name, hits] : plain) {
-        if (hits < 100) continue;
-        const auto& sums = weighted[name];
-        ++kinds;
-        const double deviation = std::sqrt(hits + sums[1]);
-        const double p = normal_p_value((hits - sums[0]) / deviation);
-        p_values.push_back(p);
-        EXPECT_GT(p, 1e-6) << test.name << ", s = " << s << ": " << name << ": " << hits
-                           << " against " << sums[0] << " +- " << deviation;
-      }
+    for (const auto& [name, hits] : plain) {
+      if (hits < 100) continue;
+      const auto& sums = weighted[name];
+      const double deviation = std::sqrt(hits + sums[1]);
+      p_values.push_back(normal_p_value((hits - sums[0]) / deviation));
+      EXPECT_GT(p_values.back(), 1e-6) << test.name << ", s = " << s << ": " << name << ": " << hits
+                                       << " against " << sums[0] << " +- " << deviation;
     }
   }
+}
+
+/// A mirror whose shading normals lean far from its plane, between a floor and a lamp.
+TestScene bent_mirror() {
+  SceneBuilder builder;
+  const auto white = builder.add_material({builder.add_bsdf(Diffuse{}), std::nullopt});
+  const auto mirror = builder.add_material({builder.add_bsdf(Conductor{}), std::nullopt});
+  builder.add_shape(quad({-2, 0, 2}, {4, 0, 0}, {0, 0, -4}), white);
+  builder.add_shape(quad({-1.5, 0, -1}, {3, 0, 0}, {0, 2, 0}, false, 0.8), mirror);
+  builder.add_shape(quad({-1, 2, -1}, {2, 0, 0}, {0, 0, 2}), white, Rgbd::Ones());
+  builder.set_camera(look_at({0, 1.5, 3}, {0, 0.4, 0}, 0.6));
+  return {"bent mirror", builder.build(), 5};
+}
+
+// Law: the same for paths from both ends, whatever the number s of vertices on the light's side. A
+// path with s = 0, 1, 2, .. light vertices is as dense as the paths that come with another s; also
+// through a delta lobe whose shading normal is another than the geometric one.
+TEST(PathSampler, DensitiesOfAllStrategiesAgree) {
+  std::vector<double> p_values;
+  for (const TestScene& test : test_scenes()) compare_strategies(test, 60000, p_values);
+  compare_strategies(bent_mirror(), 400000, p_values);
+  const auto kinds = static_cast<int>(p_values.size());
   EXPECT_GT(kinds, 200);
   const double significance = sidak(0.01, kinds);
   for (const double p : p_values) EXPECT_GT(p, significance);
