@@ -2,11 +2,9 @@
 /// The integrator `path`: the reference that the samplers are proven against.
 #include <tbb/task_arena.h>
 
-#include <algorithm>
-
 #include "driftlight/render.h"
+#include "pass_loop.h"
 #include "path_tracer.h"
-#include "stopwatch.h"
 
 namespace driftlight {
 namespace {
@@ -14,23 +12,10 @@ namespace {
 PathResult run_path(const Scene& scene, const PathOptions& options, const RenderOptions& render,
                     int samples_per_pixel) {
   PixelSums sums(scene, options.max_depth, render.seed);
-  const Stopwatch watch;
-  PathResult result;
-  std::uint64_t passes = 0;
-  while (true) {
-    const double elapsed = watch.seconds();
-    const double fraction =
-        render.time ? elapsed / *render.time : static_cast<double>(passes) / samples_per_pixel;
-    if (render.progress) render.progress({std::min(fraction, 1.0), elapsed});
-    if (fraction >= 1.0) break;
-    result.stopped = render.stop != nullptr && render.stop->load();
-    if (result.stopped) break;
-    sums.pass(passes++);
-  }
-  result.image = sums.image(passes);
-  result.samples_per_pixel = static_cast<double>(passes);
+  PathResult result =
+      run_passes(render, samples_per_pixel, [&](std::uint64_t pass) { sums.pass(pass); });
+  result.image = sums.image(static_cast<std::uint64_t>(result.samples_per_pixel));
   result.non_finite = sums.non_finite();
-  result.render_seconds = watch.seconds();
   return result;
 }
 

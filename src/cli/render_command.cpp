@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <type_traits>
 #include <utility>
@@ -65,15 +64,6 @@ void check_outputs(const RenderCommand& command) {
   if (command.statistics) check_target(*command.statistics);
   if (command.layers) check_target(*command.layers);
   if (command.strategies) check_target(*command.strategies);
-}
-
-void write_text(const std::filesystem::path& file, const std::string& text) {
-  PendingFile pending(file);
-  std::ofstream out(pending.temporary());
-  out << text;
-  out.close();
-  if (!out) throw RuntimeError(fmt::format("cannot write '{}'", file.string()));
-  pending.commit();
 }
 
 /// Shows nothing if quiet, the rest by degrees.
