@@ -123,7 +123,7 @@ StrategyDensities strategy_densities(const Scene& scene, const PathTopology& top
 
   StrategyDensities result;
   auto& q = result.by_light_vertices;
-  if (path.can_hit) q[0] = path.measure * prefix[static_cast<std::size_t>(n + 1)];
+  if (path.can_hit) q[0] = path.measure * prefix[static_cast<std::size_t>(n) + 1];
   const double choice = scene.emitter_probability(topology.emitter) * path.measure;
   // Whether x_{t-1} can be connected to.
   const auto connects = [&](int t) { return t == 1 || !vertex(t - 1).delta; };

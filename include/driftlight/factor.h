@@ -64,7 +64,7 @@ class RiccatiFactor {
 
   RiccatiFactor() = default;
   /// Unless `status` is Ok afterwards no other member may be used.
-  explicit RiccatiFactor(const Linearization& linearization);
+  explicit RiccatiFactor(const Linearization& path);
 
   Status status() const { return status_; }
   double log_det() const { return log_det_; }
@@ -78,8 +78,9 @@ class RiccatiFactor {
     Eigen::Array4d first, second;
   };
   struct Step {
-    Stage::Kind kind;
-    bool has_block;
+    // Initialised: a factor is copied with the steps that its path does not reach.
+    Stage::Kind kind = Stage::Kind::Free;
+    bool has_block = false;
     /// R = [r00 r01; 0 r11], and the inverses of its diagonal.
     double r00, r01, r11, inverse00, inverse11;
     Pair gain;  ///< K

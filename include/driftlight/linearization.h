@@ -77,12 +77,12 @@ void linearize_by_hand(const Scene& scene, const PathTopology& topology, const C
 /// The residual rows over all coordinates of the path, sqrt(w)/3 dr / d delta. (residuals x d)
 using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
                                kMaxResiduals, kMaxDimension>;
-Jacobian jacobian(const Linearization& linearization);
+Jacobian jacobian(const Linearization& path);
 
 /// Q = J^T J + floor, dense and symmetric. (d x d)
-Matrix constraint_matrix(const Linearization& linearization);
+Matrix constraint_matrix(const Linearization& path);
 
 /// Q x, in O(length). (d)
-Vector apply_constraints(const Linearization& linearization, const Vector& x);
+Vector apply_constraints(const Linearization& path, const Vector& x);
 
 }  // namespace driftlight

@@ -204,6 +204,7 @@ Integrator parse_integrator(const std::string& name) {
   for (const auto& [integrator, known] : kIntegrators)
     if (known == name) return integrator;
   std::vector<std::string_view> names;
+  names.reserve(std::size(kIntegrators));
   for (const auto& known : kIntegrators) names.push_back(known.second);
   throw UsageError(
       fmt::format("unknown integrator '{}'; the integrators are {}", name, fmt::join(names, ", ")));
