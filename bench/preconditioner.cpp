@@ -96,6 +96,7 @@ void run(const std::filesystem::path& file) {
   load.defines = {{"width", "128"}, {"height", "96"}};
   const LoadedScene loaded = load_scene(file, load);
   LangevinOptions options;
+  options.mode = Mode::Chain;
   options.max_depth = loaded.max_depth.value_or(options.max_depth);
   PathSampler sampler(loaded.scene, options.max_depth);
   const Bootstrap bootstrap(sampler, loaded.scene, options.bootstrap, 1);

@@ -4,12 +4,10 @@
 #include <fmt/format.h>
 #include <tbb/task_arena.h>
 
-#include <cmath>
-
+#include "bidirectional_tracer.h"
 #include "driftlight/render.h"
 #include "pass_loop.h"
 #include "sample_film.h"
-#include "strategy_weights.h"
 
 namespace driftlight {
 namespace {
@@ -28,101 +26,34 @@ std::vector<std::string> strategy_names(int max_depth) {
   return names;
 }
 
-class BidirectionalTracer {
+/// Sorts what the tracer finds by strategy.
+class StrategySink {
  public:
-  BidirectionalTracer(const Scene& scene, const BdptOptions& options)
-      : scene_(scene),
-        tracer_(scene, options.heuristic),
-        weights_(scene, options.heuristic),
-        max_depth_(options.max_depth) {}
+  explicit StrategySink(SampleFilm::Sink& film) : film_(film) {}
 
-  void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& sink) {
-    const Vec3d v = scene_.camera().direction(film);
-    const auto escape = tracer_.trace(Walk::FromSensor, tracer_.leave_sensor(v),
-                                      RayFollower(scene_, v), max_depth_, rng, from_sensor_);
-    trace_from_light(rng);
-    for (int t = 2; t < from_sensor_.size() + 2; ++t) {
-      const SubpathVertex& z = from_sensor_[t - 2];
-      hit_area(z, t, sink);
-      if (z.delta || t > max_depth_) continue;
-      connect_to_light(z, t, rng, sink);
-      for (int s = 2; s < from_light_.size() + 2 && s + t <= max_depth_ + 1; ++s)
-        if (!from_light_[s - 2].delta) connect(z, t, from_light_[s - 2], s, sink);
-    }
-    if (escape) hit_environment(*escape, sink);
-    for (int s = 2; s < from_light_.size() + 2; ++s)
-      if (!from_light_[s - 2].delta) connect_to_sensor(from_light_[s - 2], s, sink);
+  void add(const Rgbd& value, const FoundPath& path) {
+    film_.add(value, strategy_index(path.s, path.t));
+  }
+  void splat(const Vec2d& film, const Rgbd& value, const FoundPath& path) {
+    film_.splat(film, value, strategy_index(path.s, path.t));
   }
 
  private:
-  void trace_from_light(Rng& rng) {
-    const LightEnd end = sample_light_end(scene_, rng);
-    const Emission emission = sample_emission(scene_, end, rng);
-    tracer_.trace(Walk::FromLight, tracer_.leave_light(end, emission),
-                  RayFollower(scene_, emission.origin, emission.start, emission.direction),
-                  max_depth_ - 1, rng, from_light_);
+  SampleFilm::Sink& film_;
+};
+
+class BdptSampler {
+ public:
+  BdptSampler(const Scene& scene, const BdptOptions& options)
+      : tracer_(scene, options.heuristic, options.max_depth) {}
+
+  void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& film_sink) {
+    StrategySink sink(film_sink);
+    tracer_.sample(film, rng, sink);
   }
 
-  void hit_area(const SubpathVertex& z, int t, SampleFilm::Sink& sink) const {
-    const auto end = light_end_at(scene_, z.surface);
-    if (!end) return;
-    const double w = weights_.hit(z, t, *end, end->n.dot(z.surface.wi));
-    sink.add(w * z.throughput * end->emitted, strategy_index(0, t));
-  }
-
-  void hit_environment(const Departure& escape, SampleFilm::Sink& sink) const {
-    const auto end = light_end_toward(scene_, escape.direction);
-    if (!end) return;
-    const int t = from_sensor_.size() + 2;
-    const double w = weights_.hit(tracer_.arrive_at_infinity(escape), t, *end, 1.0);
-    sink.add(w * escape.throughput * end->emitted, strategy_index(0, t));
-  }
-
-  /// s = 1: f_s |n_s . wo| L cos / (p(y) r^2)
-  void connect_to_light(const SubpathVertex& z, int t, Rng& rng, SampleFilm::Sink& sink) const {
-    const LightEnd end = sample_light_end(scene_, rng);
-    const SurfaceHit& x = z.surface;
-    const LightEdge edge = edge_to(end, x.at.p);
-    if (!(edge.cosine > 0.0) || !passes(x.at, x.wi, edge.direction)) return;
-    const Rgbd f = scattered(x, x.wi, edge.direction);
-    if (!(f.maxCoeff() > 0.0) || !reaches(scene_, end, x, edge)) return;
-    const double geometry = edge.cosine * edge.inverse_r2 / end.density;
-    const double w = weights_.emitter(z, end, edge);
-    sink.add(w * geometry * z.throughput * f * end.emitted, strategy_index(1, t));
-  }
-
-  /// s > 1, t > 1: f_z f_y |n_g . wi| / (r^2 |n_g . wo|), the cosines those at y, as in
-  /// SubpathTracer::depart.
-  void connect(const SubpathVertex& z, int t, const SubpathVertex& y, int s,
-               SampleFilm::Sink& sink) const {
-    const SurfaceHit& a = z.surface;
-    const SurfaceHit& b = y.surface;
-    const Vec3d edge = b.at.p - a.at.p;
-    const double inverse_r2 = 1.0 / edge.squaredNorm();
-    const Vec3d v = edge * std::sqrt(inverse_r2);
-    const Vec3d back = -v;
-    if (!passes(a.at, a.wi, v) || !passes(b.at, back, b.wi)) return;
-    const Rgbd f = scattered(a, a.wi, v) * scattered(b, back, b.wi);
-    if (!(f.maxCoeff() > 0.0)) return;
-    if (scene_.occluded(scene_.leave(a.at.p, a.at.n_g, v), scene_.leave(b.at.p, b.at.n_g, back)))
-      return;
-    const double geometry = std::abs(b.at.n_g.dot(v) / b.at.n_g.dot(b.wi)) * inverse_r2;
-    const double w = weights_.connection(z, y, v, inverse_r2);
-    sink.add(w * geometry * z.throughput * f * y.throughput, strategy_index(s, t));
-  }
-
-  /// t = 1
-  void connect_to_sensor(const SubpathVertex& y, int s, SampleFilm::Sink& sink) const {
-    const auto seen = driftlight::connect_to_sensor(scene_, y);
-    if (seen) sink.splat(seen->film, weights_.sensor(y, *seen) * seen->value, strategy_index(s, 1));
-  }
-
-  const Scene& scene_;
-  SubpathTracer tracer_;
-  StrategyWeights weights_;
-  int max_depth_;
-  Subpath from_sensor_;  ///< kept between samples for its storage only
-  Subpath from_light_;
+ private:
+  BidirectionalTracer tracer_;
 };
 
 }  // namespace
@@ -130,14 +61,14 @@ class BidirectionalTracer {
 PathResult render_bdpt(const Scene& scene, const BdptOptions& options, const RenderOptions& render,
                        int samples_per_pixel) {
   options.validate();
-  const BidirectionalTracer tracer(scene, options);
+  const BdptSampler sampler(scene, options);
   std::vector<std::string> names;
   if (render.strategies != nullptr) names = strategy_names(options.max_depth);
   SampleFilm film(scene.camera(), render.seed, static_cast<int>(names.size()));
   tbb::task_arena arena(render.threads > 0 ? render.threads : tbb::task_arena::automatic);
   PathResult result = arena.execute([&] {
     return run_passes(render, samples_per_pixel,
-                      [&](std::uint64_t index) { film.pass(index, tracer); });
+                      [&](std::uint64_t index) { film.pass(index, sampler); });
   });
   result.image = film.image(result.samples_per_pixel);
   result.non_finite = film.non_finite();

@@ -1,40 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "driftlight/chain.h"
 
-#include <algorithm>
 #include <cmath>
-
-#include "driftlight/divergence.h"
 
 namespace driftlight {
 
-double log_acceptance(double log_target_from, double log_target_to, double log_pdf_forward,
-                      double log_pdf_reverse) {
-  const double log_ratio = log_target_to - log_target_from + log_pdf_reverse - log_pdf_forward;
-  return std::isnan(log_ratio) ? -std::numeric_limits<double>::infinity()
-                               : std::min(0.0, log_ratio);
-}
-
-void prepare_step(const Scene& scene, const KernelOptions& options, ChainState& state) {
-  const DerivativeRequest request{
-      .gradient = options.drift != Drift::None,
-      .constraints = options.preconditioner == PreconditionerKind::Constraints};
-  state.chart = Chart(scene, state.topology, state.coordinates);
-  state.has_step = true;
-  state.figures.reset();
-  Linearization path;
-  linearize(scene, state.topology, state.chart, options.derivatives, request, path);
-  std::optional<Vector> div;
-  if (options.drift == Drift::Full && request.constraints) {
-    div = divergence(scene, state.topology, state.chart, options.derivatives);
-    if (!div->allFinite()) div.reset();
-  }
-  state.finite = state.step.assign(options, path, div ? &*div : nullptr);
-}
-
 Chain::Chain(const Scene& scene, const PathSampler& sampler, const LangevinOptions& options,
              Film& film, const PathSampler::Sample& start, Rng rng, StepLayers* layers)
-    : scene_(scene), sampler_(sampler), options_(options), film_(film), rng_(rng), layers_(layers) {
+    : scene_(scene),
+      sampler_(sampler),
+      options_(options),
+      small_step_(scene, options.kernel),
+      film_(film),
+      rng_(rng),
+      layers_(layers) {
   current().topology = start.topology;
   current().coordinates = start.coordinates;
   current().contribution = contribution(scene, start.topology, start.coordinates);
@@ -47,7 +26,8 @@ void Chain::run(std::uint64_t mutations) {
     const std::optional<double> acceptance = large ? propose_large() : propose_small();
     ++kernel.proposed;
     kernel.accepted += acceptance.value_or(0.0);
-    if (layers_ != nullptr && !large) record_step(acceptance.value_or(0.0));
+    if (layers_ != nullptr && !large)
+      small_step_.record(current(), acceptance.value_or(0.0), *layers_);
     const bool moved = resolve(acceptance.value_or(0.0));
     if (acceptance && !moved && !large) ++statistics_.rejections.hastings;
   }
@@ -85,85 +65,12 @@ std::optional<double> Chain::propose_large() {
 std::optional<double> Chain::propose_small() {
   ChainState& from = current();
   ChainState& to = proposed();
-  const KernelOptions& options = options_.kernel;
-  if (!from.has_step) prepare(from);
-  if (!from.finite) {
-    ++statistics_.rejections.non_finite;
-    return std::nullopt;
-  }
-  const double scale = draw_scale(options, rng_);
-  scale_ = scale;
-  const Vector delta = from.step.sample(scale, rng_);
-  if (!delta.allFinite()) {
-    ++statistics_.rejections.non_finite;
-    return std::nullopt;
-  }
-  to.coordinates = from.chart.retract(delta);
-  if (!evaluate_proposed()) return std::nullopt;
-  prepare(to);
-  if (!to.finite) {
-    ++statistics_.rejections.non_finite;
-    return std::nullopt;
-  }
-  const auto there = from.chart.inverse(to.coordinates);
-  const auto back = to.chart.inverse(from.coordinates);
-  if (!there || !back) return std::nullopt;
-  // `there->delta` is delta up to rounding; taking it from the coordinates keeps the two densities
-  // on one footing.
-  const double forward = from.step.log_density(there->delta, scale) + there->log_jacobian;
-  const double reverse = to.step.log_density(back->delta, scale) + back->log_jacobian;
-  if (!std::isfinite(forward) || !std::isfinite(reverse)) {
-    ++statistics_.rejections.non_finite;
-    return std::nullopt;
-  }
-  return std::exp(
-      log_acceptance(from.contribution.log_target, to.contribution.log_target, forward, reverse));
-}
-
-void Chain::prepare(ChainState& state) {
-  prepare_step(scene_, options_.kernel, state);
-  if (probe_ != nullptr) probe_->visit(state.topology, state.coordinates);
-}
-
-bool Chain::evaluate_proposed() {
-  ChainState& to = proposed();
   Rejections& rejections = statistics_.rejections;
-  switch (trace(scene_, current().topology, to.coordinates, to.topology)) {
-    case TraceStatus::Ok:
-      break;
-    case TraceStatus::Missed:
-      ++rejections.missed;
-      return false;
-    case TraceStatus::OtherLobe:
-      ++rejections.other_lobe;
-      return false;
-    case TraceStatus::Occluded:
-      ++rejections.occluded;
-      return false;
-  }
-  to.has_step = false;
-  to.log_weight = std::numeric_limits<double>::quiet_NaN();
-  to.contribution = contribution(scene_, to.topology, to.coordinates);
-  if (std::isfinite(to.contribution.log_target)) return true;
-  // log f = -infinity is a path without light, as a missed one; all else is a numerical failure.
-  if (to.contribution.log_target == -std::numeric_limits<double>::infinity())
-    ++rejections.missed;
-  else
-    ++rejections.non_finite;
-  return false;
-}
-
-void Chain::record_step(double acceptance) {
-  ChainState& from = current();
-  const Vec2d film = scene_.camera().film_position(from.coordinates(0));
-  if (!from.finite) {
-    layers_->add(film, acceptance, nullptr, 0.0);
-    return;
-  }
-  if (!from.figures)
-    from.figures =
-        step_figures(scene_, from.topology, from.chart, options_.kernel.derivatives, from.step);
-  layers_->add(film, acceptance, &*from.figures, from.step.time_step(scale_));
+  if (!small_step_.propose(from, to, rng_, rejections)) return std::nullopt;
+  const auto densities = small_step_.log_densities(from, to, rejections);
+  if (!densities) return std::nullopt;
+  return std::exp(log_acceptance(from.contribution.log_target, to.contribution.log_target,
+                                 densities->forward, densities->reverse));
 }
 
 bool Chain::resolve(double acceptance) {
@@ -176,16 +83,14 @@ bool Chain::resolve(double acceptance) {
     gathered_ = acceptance;
   } else if (acceptance > 0.0) {
     const ChainState& to = proposed();
-    film_.splat(scene_.camera().film_position(to.coordinates(0)), to.contribution.color,
-                acceptance);
+    film_.splat(to.contribution.film, to.contribution.color, acceptance);
   }
   return accept;
 }
 
 void Chain::flush() {
   if (gathered_ > 0.0)
-    film_.splat(scene_.camera().film_position(current().coordinates(0)),
-                current().contribution.color, gathered_);
+    film_.splat(current().contribution.film, current().contribution.color, gathered_);
   gathered_ = 0.0;
 }
 

@@ -2,13 +2,25 @@
 #include "driftlight/contribution.h"
 
 namespace driftlight {
+namespace {
+
+struct FilmVisitor : ContributionVisitor<double> {
+  Vec2d film;
+
+  void sensor(const PerspectiveCamera& camera, const Vec3d& v) {
+    ContributionVisitor<double>::sensor(camera, v);
+    film = camera.film_position(v);
+  }
+};
+
+}  // namespace
 
 Contribution contribution(const Scene& scene, const PathTopology& topology,
                           const PathCoordinates& coordinates) {
-  ContributionVisitor<double> visitor;
+  FilmVisitor visitor;
   walk<double>(scene, topology, coordinates, visitor);
   const double light = luminance(visitor.color());
-  return {visitor.log_scale() + std::log(light), visitor.color() / light};
+  return {visitor.log_scale() + std::log(light), visitor.color() / light, visitor.film};
 }
 
 }  // namespace driftlight

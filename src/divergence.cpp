@@ -15,15 +15,19 @@ Vector divergence(const Scene& scene, const PathTopology& topology, const Chart&
   const int d = chart.dimension();
   Linearization path;
   linearize(scene, topology, chart, method, kConstraints, path);
-  const RiccatiFactor factor(path);
-  if (factor.status() != RiccatiFactor::Status::Ok)
+  Factor factor;
+  if (factorise(path, factor) != FactorStatus::Ok)
     return Vector::Constant(d, std::numeric_limits<double>::quiet_NaN());
   const Vector diagonal =
       jacobian(path).colwise().squaredNorm().transpose().array() + kConstraintFloor;
+  const auto solve = [&](const Vector& x) {
+    return std::visit([&](const auto& f) { return Vector(f.solve(f.solve_transposed(x))); },
+                      factor);
+  };
   Vector delta = Vector::Zero(d);
   Vector sum = Vector::Zero(d);
   for (int j = 0; j < d; ++j) {
-    const Vector column = factor.solve(factor.solve_transposed(Vector(Vector::Unit(d, j))));
+    const Vector column = solve(Vector(Vector::Unit(d, j)));
     // A small part of the width that the constraints leave to this coordinate while the others are
     // held, 1 / (3 sqrt(Q_jj)): far above rounding, far below curvature. With the others free it is
     // sqrt(Q^-1_jj) / 3, which can be a hundred times wider: such a step leaves the valley.
@@ -35,7 +39,7 @@ Vector divergence(const Scene& scene, const PathTopology& topology, const Chart&
     }
     delta[j] = 0.0;
   }
-  return -factor.solve(factor.solve_transposed(sum));
+  return -solve(sum);
 }
 
 }  // namespace driftlight

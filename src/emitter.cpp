@@ -6,6 +6,72 @@
 
 namespace driftlight {
 
+// ---- SpotEmitter ----------------------------------------------------------------------------
+
+/// With b the beam width and c the cutoff angle the falloff has the integral
+///   2 pi (1 - (sin c - sin b) / (c - b)) = 2 pi (1 - cos m sin h / h),
+/// m = (c + b) / 2 and h = (c - b) / 2.
+SpotEmitter::SpotEmitter(const Vec3d& position, const Vec3d& axis, const Rgbd& intensity,
+                         double cutoff, double beam_width)
+    : position_(position),
+      axis_(axis.normalized()),
+      intensity_(intensity),
+      cutoff_(cutoff),
+      beam_width_(beam_width),
+      inverse_transition_(cutoff > beam_width ? 1.0 / (cutoff - beam_width) : 0.0) {
+  const double half = 0.5 * (cutoff - beam_width);
+  const double sinc = half > 0.0 ? std::sin(half) / half : 1.0;
+  solid_angle_ = 2.0 * kPi * (1.0 - std::cos(0.5 * (cutoff + beam_width)) * sinc);
+}
+
+double SpotEmitter::angle(const Vec3d& v) const {
+  const double cosine = axis_.dot(v);
+  return std::atan2((v - cosine * axis_).norm(), cosine);
+}
+
+Vec3d SpotEmitter::falloff_gradient(const Vec3d& v) const {
+  const double theta = angle(v);
+  if (theta <= beam_width_ || theta >= cutoff_) return Vec3d::Zero();
+  return inverse_transition_ / std::sin(theta) * (axis_ - std::cos(theta) * v);
+}
+
+/// The falloff integrates to 1 - cos b within the beam (over 2 pi), where directions are uniform,
+/// and beyond it up to theta to
+///   F(theta) = ((c - b) cos b + sin b - (c - theta) cos theta - sin theta) / (c - b),
+///   F' = (c - theta) sin theta / (c - b),
+/// which Newton steps invert, kept inside a bracket.
+Vec3d SpotEmitter::sample(double u1, double u2) const {
+  const double share = u1 * 0.5 * kInvPi * solid_angle_;
+  const double half_sine = std::sin(0.5 * beam_width_);
+  const double in_beam = 2.0 * half_sine * half_sine;
+  // Rounding must not carry a direction to the rim, where the density is 0.
+  const double most = (1.0 - 1e-12) * cutoff_;
+  double theta = 2.0 * std::asin(std::sqrt(0.5 * std::min(share, in_beam)));
+  if (share > in_beam && inverse_transition_ > 0.0) {
+    double low = beam_width_;
+    double high = most;
+    theta = 0.5 * (low + high);
+    const double start = (cutoff_ - beam_width_) * std::cos(beam_width_) + std::sin(beam_width_);
+    for (int i = 0; i < 60 && high - low > 1e-13 * cutoff_; ++i) {
+      const double sum = start - (cutoff_ - theta) * std::cos(theta) - std::sin(theta);
+      const double excess = sum * inverse_transition_ - (share - in_beam);
+      (excess > 0.0 ? high : low) = theta;
+      const double step =
+          excess / ((cutoff_ - theta) * std::sin(theta) * inverse_transition_ + 1e-300);
+      const double next = theta - step;
+      const bool inside = next > low && next < high;
+      if (inside && std::abs(step) < 1e-13 * cutoff_) break;
+      theta = inside ? next : 0.5 * (low + high);
+    }
+  }
+  theta = std::min(theta, most);
+  const double phi = 2.0 * kPi * u2;
+  const double sine = std::sin(theta);
+  return to_world({sine * std::cos(phi), sine * std::sin(phi), std::cos(theta)}, axis_);
+}
+
+// ---- EnvironmentMap -------------------------------------------------------------------------
+
 EnvironmentMap::EnvironmentMap(Bitmap bitmap, const Eigen::Matrix3d& to_world, double scale)
     : bitmap_(std::move(bitmap)),
       axis_x_(to_world.col(0)),

@@ -239,4 +239,9 @@ Vector RiccatiFactor::solve_transposed(const Vector& x) const {
   return y;
 }
 
+FactorStatus factorise(const Linearization& path, Factor& factor) {
+  if (path.has_light_side) return factor.emplace<TwoSidedFactor>(path).status();
+  return factor.emplace<RiccatiFactor>(path).status();
+}
+
 }  // namespace driftlight

@@ -13,6 +13,7 @@
 #include <memory>
 
 #include "driftlight/error.h"
+#include "driftlight/scalar.h"
 #include "pending_file.h"
 
 namespace driftlight {
@@ -107,6 +108,13 @@ void write_oiio(const PendingFile& file, const Image& image,
 }
 
 }  // namespace
+
+double mean_luminance(const Image& image) {
+  Rgbd sum = Rgbd::Zero();
+  for (std::size_t i = 0; i < image.rgb.size(); ++i)
+    sum[static_cast<Eigen::Index>(i % 3)] += static_cast<double>(image.rgb[i]);
+  return 3.0 * luminance(sum) / static_cast<double>(image.rgb.size());
+}
 
 Image read_image(const std::filesystem::path& file) {
   const auto fail = [&](const std::string& why) {

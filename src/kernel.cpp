@@ -29,9 +29,9 @@ bool StepDistribution::assign(const KernelOptions& options, const Linearization&
   const int dimension = 2 * path.block_count;
   bool identity = path.stage_count == 0;
   if (!identity) {
-    const auto& riccati = factor_.emplace<RiccatiFactor>(path);
-    if (riccati.status() == RiccatiFactor::Status::NonFinite) return false;
-    identity = riccati.status() == RiccatiFactor::Status::Indefinite;
+    const FactorStatus status = factorise(path, factor_);
+    if (status == FactorStatus::NonFinite) return false;
+    identity = status == FactorStatus::Indefinite;
   }
   if (identity) factor_ = IdentityFactor(dimension);
   const bool has_gradient = path.gradient.size() > 0;

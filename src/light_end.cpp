@@ -35,14 +35,23 @@ LightEnd area_end(const Scene& scene, std::uint32_t index, const EmitterPoint& y
   return end;
 }
 
-LightEnd point_end(const Scene& scene, std::uint32_t index) {
-  const auto& light = std::get<PointEmitter>(scene.emitters()[index]);
+/// A point, spot or directional emitter.
+LightEnd delta_end(const Scene& scene, std::uint32_t index) {
+  const Emitter& emitter = scene.emitters()[index];
   LightEnd end;
-  end.kind = LightEnd::Kind::Point;
   end.emitter = index;
-  end.p = light.position;
-  end.emitted = light.intensity;
   end.density = scene.emitter_probability(index);
+  if (const auto* light = std::get_if<DirectionalEmitter>(&emitter)) {
+    end.kind = LightEnd::Kind::Directional;
+    end.p = -light->direction;
+    end.emitted = light->irradiance;
+    return end;
+  }
+  end.kind = LightEnd::Kind::Point;
+  end.p = position_of(emitter);
+  end.spot = std::get_if<SpotEmitter>(&emitter);
+  end.emitted =
+      end.spot != nullptr ? end.spot->intensity() : std::get<PointEmitter>(emitter).intensity;
   return end;
 }
 
@@ -59,7 +68,7 @@ LightEnd sample_light_end(const Scene& scene, Rng& rng) {
     return environment_end(scene, index, square_to_sphere(square.x(), square.y()));
   if (const auto* light = std::get_if<AreaEmitter>(&emitter))
     return area_end(scene, index, scene.sample_area(*light, square.x(), square.y()));
-  return point_end(scene, index);
+  return delta_end(scene, index);
 }
 
 std::optional<LightEnd> light_end_at(const Scene& scene, const SurfaceHit& surface) {
@@ -74,31 +83,29 @@ std::optional<LightEnd> light_end_toward(const Scene& scene, const Vec3d& direct
 }
 
 LightEdge edge_to(const LightEnd& end, const Vec3d& p) {
-  if (end.kind == LightEnd::Kind::Environment) return {end.p, 1.0, 1.0};
+  if (end.at_infinity()) return {end.p, 1.0, 1.0, 1.0};
   const Vec3d edge = end.p - p;
   const double inverse_r2 = 1.0 / edge.squaredNorm();
   const Vec3d direction = edge * std::sqrt(inverse_r2);
   const double cosine = end.kind == LightEnd::Kind::Area ? -end.n.dot(direction) : 1.0;
-  return {direction, inverse_r2, cosine};
+  return {direction, inverse_r2, cosine, end.falloff(-direction)};
 }
 
 bool reaches(const Scene& scene, const LightEnd& end, const SurfaceHit& surface,
              const LightEdge& edge) {
-  if (end.kind == LightEnd::Kind::Environment) {
-    const Vec3d start = scene.leave(surface.at.p, surface.at.n_g, edge.direction);
-    return !scene.occluded_to_infinity(start, edge.direction);
-  }
+  if (end.at_infinity()) return infinity_status(scene, surface, edge.direction) == TraceStatus::Ok;
   return connection_status(scene, surface, scene.emitters()[end.emitter], {end.p, end.n}) ==
          TraceStatus::Ok;
 }
 
-double emission_density(const Scene& scene, const LightEnd& end, double cosine) {
+double emission_density(const Scene& scene, const LightEnd& end, double cosine, double falloff) {
   switch (end.kind) {
     case LightEnd::Kind::Area:
       return cosine * kInvPi;
     case LightEnd::Kind::Point:
-      return 0.25 * kInvPi;
+      return end.spot != nullptr ? falloff / end.spot->solid_angle() : 0.25 * kInvPi;
     case LightEnd::Kind::Environment:
+    case LightEnd::Kind::Directional:
       break;
   }
   return kInvPi / (scene.radius() * scene.radius());
@@ -110,17 +117,21 @@ Emission sample_emission(const Scene& scene, const LightEnd& end, Rng& rng) {
     case LightEnd::Kind::Area: {
       const Vec3d local = square_to_cosine_hemisphere(u.x(), u.y());
       const Vec3d v = to_world(local, end.n);
-      return {end.p, scene.leave(end.p, end.n, v), v, local.z()};
+      return {end.p, scene.leave(end.p, end.n, v), v, local.z(), 1.0};
     }
-    case LightEnd::Kind::Point:
-      return {end.p, end.p, square_to_sphere(u.x(), u.y()), 1.0};
+    case LightEnd::Kind::Point: {
+      const bool even = end.spot == nullptr;
+      const Vec3d v = even ? square_to_sphere(u.x(), u.y()) : end.spot->sample(u.x(), u.y());
+      return {end.p, end.p, v, 1.0, end.falloff(v)};
+    }
     case LightEnd::Kind::Environment:
+    case LightEnd::Kind::Directional:
       break;
   }
   // From the disk that touches the bounding sphere, across the ray.
   const Vec2d disk = square_to_disk(u.x(), u.y());
   const Vec3d origin = scene.center() + scene.radius() * to_world({disk.x(), disk.y(), 1.0}, end.p);
-  return {origin, origin, -end.p, 1.0};
+  return {origin, origin, -end.p, 1.0, 1.0};
 }
 
 }  // namespace driftlight

@@ -10,22 +10,28 @@
 
 namespace driftlight {
 
-/// A point on an emitter. The environment is a point at infinity: its measure is solid angle, and
-/// an edge to it has neither a cosine at its far end nor 1 / r^2.
+/// A point on an emitter. An environment or a directional emitter is a point at infinity: the
+/// measure of the former is solid angle, and an edge to it has neither a cosine at its far end nor
+/// 1 / r^2.
 struct LightEnd {
-  enum class Kind : std::uint8_t { Area, Point, Environment };
+  enum class Kind : std::uint8_t { Area, Point, Environment, Directional };
 
   Kind kind = Kind::Area;
   std::uint32_t emitter = 0;
-  Vec3d p{0, 0, 0};       ///< position; of the environment the unit direction toward it
-  Vec3d n{0, 0, 0};       ///< unit normal of an area emitter, on the side that emits
-  Rgbd emitted{0, 0, 0};  ///< radiance; of a point emitter its intensity
+  Vec3d p{0, 0, 0};                   ///< position; at infinity the unit direction toward it
+  Vec3d n{0, 0, 0};                   ///< unit normal of an area emitter, on the side that emits
+  const SpotEmitter* spot = nullptr;  ///< of a point that is one
+  /// Radiance; intensity of a point, of a spot on its axis; irradiance of a directional emitter.
+  Rgbd emitted{0, 0, 0};
   /// Of emitter sampling: probability of the emitter, times 1 / area or the density of the
   /// direction.
   double density = 0;
 
+  bool at_infinity() const { return kind == Kind::Environment || kind == Kind::Directional; }
   /// False if no ray from elsewhere can end here.
-  bool can_be_hit() const { return kind != Kind::Point; }
+  bool can_be_hit() const { return kind == Kind::Area || kind == Kind::Environment; }
+  /// Share of `emitted` that leaves along the unit direction v: that of a spot, else 1.
+  double falloff(const Vec3d& v) const { return spot != nullptr ? spot->falloff(v) : 1.0; }
 };
 
 /// Draws an emitter and a point on it.
@@ -39,7 +45,10 @@ std::optional<LightEnd> light_end_toward(const Scene& scene, const Vec3d& direct
 struct LightEdge {
   Vec3d direction;  ///< unit, away from the surface
   double inverse_r2;
-  double cosine;  ///< at the light end; not positive on the dark side
+  double cosine;   ///< at the light end; not positive on the dark side
+  double falloff;  ///< of `emitted`; 0 outside of a spot's cone
+
+  bool lit() const { return cosine > 0.0 && falloff > 0.0; }
 };
 LightEdge edge_to(const LightEnd& end, const Vec3d& p);
 
@@ -48,16 +57,17 @@ bool reaches(const Scene& scene, const LightEnd& end, const SurfaceHit& surface,
              const LightEdge& edge);
 
 /// Density of the ray that leaves the end, for a cosine > 0 with its normal:
-///   area cos / pi per solid angle, point 1 / (4 pi) per solid angle,
-///   environment 1 / (pi R^2) per area across the ray, R the radius of the scene.
-double emission_density(const Scene& scene, const LightEnd& end, double cosine);
+///   area cos / pi per solid angle, point 1 / (4 pi) per solid angle, spot falloff / (its
+///   integral), at infinity 1 / (pi R^2) per area across the ray, R the radius of the scene.
+double emission_density(const Scene& scene, const LightEnd& end, double cosine, double falloff);
 
 /// A ray drawn with that density.
 struct Emission {
   Vec3d origin;
   Vec3d start;  ///< the origin, moved off its surface
   Vec3d direction;
-  double cosine;  ///< with the normal of an area emitter; else 1
+  double cosine;   ///< with the normal of an area emitter; else 1
+  double falloff;  ///< of `emitted`, along the direction
 };
 Emission sample_emission(const Scene& scene, const LightEnd& end, Rng& rng);
 

@@ -13,8 +13,11 @@ RayFollower emit(const Scene& scene, const LightPart& light, Rng& rng) {
         scene.center() + scene.radius() * to_world({disk.x(), disk.y(), 1.0}, light.sky);
     return RayFollower(scene, origin, origin, -light.sky);
   }
-  if (light.point.n.isZero(0.0))
-    return RayFollower(scene, light.point.p, light.point.p, square_to_sphere(u.x(), u.y()));
+  if (light.point.n.isZero(0.0)) {
+    const auto* spot = std::get_if<SpotEmitter>(&scene.emitters()[light.emitter]);
+    const Vec3d v = spot != nullptr ? spot->sample(u.x(), u.y()) : square_to_sphere(u.x(), u.y());
+    return RayFollower(scene, light.point.p, light.point.p, v);
+  }
   const Vec3d v = to_world(square_to_cosine_hemisphere(u.x(), u.y()), light.point.n);
   return RayFollower(scene, light.point.p, scene.leave(light.point.p, light.point.n, v), v);
 }
@@ -27,15 +30,18 @@ std::optional<LightPart> sample_light_part(const Scene& scene, int surface_verti
   light.emitter = scene.sample_emitter(u);
   const Vec2d square = rng.uniform2();
   const Emitter& emitter = scene.emitters()[light.emitter];
-  light.infinite = is_environment(emitter);
+  const auto* parallel = std::get_if<DirectionalEmitter>(&emitter);
+  light.infinite = is_environment(emitter) || parallel != nullptr;
   if (const auto* map = std::get_if<EnvironmentMap>(&emitter))
     light.sky = map->sample(square.x(), square.y());
+  else if (parallel != nullptr)
+    light.sky = -parallel->direction;
   else if (light.infinite)
     light.sky = square_to_sphere(square.x(), square.y());
   else if (const auto* area = std::get_if<AreaEmitter>(&emitter))
     light.point = scene.sample_area(*area, square.x(), square.y());
   else
-    light.point.p = std::get<PointEmitter>(emitter).position;
+    light.point.p = position_of(emitter);
   if (surface_vertices == 0) return light;
 
   RayFollower follower = emit(scene, light, rng);

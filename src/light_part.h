@@ -21,9 +21,9 @@ struct LightPart {
   };
 
   std::uint32_t emitter = 0;
-  bool infinite = false;  ///< the emitter is an environment
-  EmitterPoint point;     ///< on a point or area emitter
-  Vec3d sky;              ///< unit direction toward an environment
+  bool infinite = false;  ///< the emitter is an environment or directional
+  EmitterPoint point;     ///< on a point, spot or area emitter
+  Vec3d sky;              ///< unit direction toward an emitter at infinity
   int count = 0;          ///< of surface vertices
   std::array<Vertex, kMaxPathLength> vertices;
   std::optional<SurfaceHit> last;  ///< the last surface vertex

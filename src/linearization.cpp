@@ -11,31 +11,60 @@ void linearize(const Scene& scene, const PathTopology& topology, const Chart& ch
     linearize_by_hand(scene, topology, chart, request, result);
 }
 
-Jacobian jacobian(const Linearization& path) {
+namespace {
+
+/// d s / d delta (4 x d)
+using StateMap = Eigen::Matrix<double, 4, Eigen::Dynamic, 0, 4, kMaxDimension>;
+
+/// Runs stages [begin, end) of one side; fills in their rows, and returns the state behind them.
+/// `block` is the next one.
+StateMap run_side(const Linearization& path, int begin, int end, const LocalColumns& columns,
+                  int& block, Jacobian& rows) {
   const int d = 2 * path.block_count;
-  Jacobian rows = Jacobian::Zero(path.row_count(), d);
-  // d s_{k-1} / d delta
-  Eigen::Matrix<double, 4, Eigen::Dynamic, 0, 4, kMaxDimension> state(4, d);
+  StateMap state(4, d);  // d s_{k-1} / d delta
   state.setZero();
-  int block = 0;
-  for (int k = 0; k < path.stage_count; ++k) {
+  for (int k = begin; k < end; ++k) {
     const Stage& stage = path.stages[static_cast<std::size_t>(k)];
-    const int begin = path.rows_begin(k);
-    const int count = stage.rows_end - begin;
-    const auto local = path.rows.middleRows(begin, count).matrix();
-    if (k > 0) rows.middleRows(begin, count) = local.leftCols<4>() * state;
-    if (stage.has_block) rows.block(begin, 2 * block, count, 2) += local.middleCols<2>(4);
+    const int first = path.rows_begin(k);
+    const int count = stage.rows_end - first;
+    const auto local = path.rows.middleRows(first, count).matrix();
+    if (k > begin) rows.middleRows(first, count) = local.middleCols<4>(columns.xi) * state;
+    if (stage.has_block) rows.block(first, 2 * block, count, 2) += local.middleCols<2>(columns.u);
     if (stage.kind == Stage::Kind::Terminal) break;
-    auto next = state;
-    next.setZero();
-    if (k > 0) next.topRows<2>() = stage.position * state;
-    if (stage.kind == Stage::Kind::Delta)
-      next.bottomRows<2>() = stage.direction * state;
-    else
-      next.block<2, 2>(2, 2 * block).setIdentity();
+    StateMap next = StateMap::Zero(4, d);
+    if (stage.kind == Stage::Kind::Point) {
+      next.block<2, 2>(0, 2 * block).setIdentity();
+    } else {
+      if (k > begin) next.topRows<2>() = stage.position * state;
+      if (stage.kind == Stage::Kind::Delta)
+        next.bottomRows<2>() = stage.direction * state;
+      else
+        next.block<2, 2>(2, 2 * block).setIdentity();
+    }
     state = next;
     if (stage.has_block) ++block;
   }
+  return state;
+}
+
+}  // namespace
+
+Jacobian jacobian(const Linearization& path) {
+  Jacobian rows = Jacobian::Zero(path.row_count(), 2 * path.block_count);
+  int block = 0;
+  if (!path.has_light_side) {
+    run_side(path, 0, path.stage_count, kSensorColumns, block, rows);
+    return rows;
+  }
+  const int last = path.stage_count - 1;
+  if (last < 0) return rows;
+  const StateMap sensor = run_side(path, 0, path.sensor_stages, kSensorColumns, block, rows);
+  const StateMap light = run_side(path, path.sensor_stages, last, kLightColumns, block, rows);
+  const int first = path.rows_begin(last);
+  const int count = path.row_count() - first;
+  const auto local = path.rows.middleRows(first, count).matrix();
+  rows.middleRows(first, count) = local.middleCols<4>(kSensorColumns.xi) * sensor +
+                                  local.middleCols<4>(kLightColumns.xi) * light;
   return rows;
 }
 
@@ -48,6 +77,11 @@ Matrix constraint_matrix(const Linearization& path) {
 
 /// y = J x by a run of the stages forward, J^T y by their adjoints backward.
 Vector apply_constraints(const Linearization& path, const Vector& x) {
+  if (path.has_light_side) {
+    const Jacobian rows = jacobian(path);
+    const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxResiduals, 1> y = rows * x;
+    return rows.transpose() * y + kConstraintFloor * x;
+  }
   Eigen::Array<double, kMaxResiduals, 1> residuals;
   Eigen::Vector4d s = Eigen::Vector4d::Zero();
   int block = 0;

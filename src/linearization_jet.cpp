@@ -11,11 +11,6 @@ namespace {
 
 using Jet = ceres::Jet<double, kLocalWidth>;
 
-/// First columns of the local variables.
-constexpr int kXi = 0;
-constexpr int kOmega = 2;
-constexpr int kU = 4;
-
 /// Makes columns (c, c + 1) of v's derivatives the tangents t, b, and all others zero.
 void seed(Vec3<Jet>& v, int c, const Vec3d& t, const Vec3d& b) {
   for (int i = 0; i < 3; ++i) {
@@ -25,20 +20,22 @@ void seed(Vec3<Jet>& v, int c, const Vec3d& t, const Vec3d& b) {
   }
 }
 
-/// The chart's base point, every block in the columns of u.
+/// The chart's base point, every block in the columns of u of its side.
 class LocalBlocks {
  public:
-  explicit LocalBlocks(const Chart& chart) : chart_(chart) {}
+  LocalBlocks(const Chart& chart, int sensor_blocks)
+      : chart_(chart), sensor_blocks_(sensor_blocks) {}
 
   Vec3<Jet> operator()(int k) const {
     const Chart::Block& block = chart_.block(k);
     Vec3<Jet> v = constant<Jet>(block.point);
-    seed(v, kU, block.t, block.b);
+    seed(v, k < sensor_blocks_ ? kSensorColumns.u : kLightColumns.u, block.t, block.b);
     return v;
   }
 
  private:
   const Chart& chart_;
+  int sensor_blocks_;
 };
 
 class RowSink {
@@ -92,26 +89,48 @@ class LocalGradients {
   Rgbd shares_;
 };
 
-/// The adjoint sweep: lambda = d log f / d s_k from the last stage back,
-///   grad_b = l_u + lambda_omega,   lambda <- l_s + A^T lambda_xi [+ D^T lambda_omega].
-Vector adjoint_sweep(const Linearization& path, const LocalGradients& gradients) {
-  Vector gradient(2 * path.block_count);
-  Eigen::Vector4d lambda = Eigen::Vector4d::Zero();
-  int block = path.block_count;
-  for (int k = path.stage_count - 1; k >= 0; --k) {
+/// The adjoint sweep over stages [begin, end) of a side: lambda = d log f / d s_k from the last
+/// stage back,
+///   grad_b = l_u + lambda_omega,   lambda <- l_s + A^T lambda_xi [+ D^T lambda_omega],
+/// and grad_b = l_u + lambda_xi at a point. `block` is one past that of the last stage.
+void adjoint_sweep(const Linearization& path, const LocalGradients& gradients, int begin, int end,
+                   const LocalColumns& columns, Eigen::Vector4d lambda, int& block,
+                   Vector& gradient) {
+  for (int k = end - 1; k >= begin; --k) {
     const Stage& stage = path.stages[static_cast<std::size_t>(k)];
     const LocalRow row = gradients.row(k);
     if (stage.has_block) {
       --block;
-      gradient[2 * block] = -(row[kU] + lambda[kOmega]);
-      gradient[2 * block + 1] = -(row[kU + 1] + lambda[kOmega + 1]);
+      const int from = stage.kind == Stage::Kind::Point ? 0 : 2;
+      gradient[2 * block] = -(row[columns.u] + lambda[from]);
+      gradient[2 * block + 1] = -(row[columns.u + 1] + lambda[from + 1]);
     }
-    if (k == 0) break;
-    Eigen::Vector4d back = row.head<4>().matrix().transpose();
+    if (k == begin) break;
+    Eigen::Vector4d back = row.segment<4>(columns.xi).matrix().transpose();
     if (stage.kind != Stage::Kind::Terminal) back += stage.position.transpose() * lambda.head<2>();
     if (stage.kind == Stage::Kind::Delta) back += stage.direction.transpose() * lambda.tail<2>();
     lambda = back;
   }
+}
+
+/// The same along each side.
+Vector adjoint_sweep(const Linearization& path, const LocalGradients& gradients) {
+  Vector gradient(2 * path.block_count);
+  int block = path.block_count;
+  if (!path.has_light_side) {
+    adjoint_sweep(path, gradients, 0, path.stage_count, kSensorColumns, Eigen::Vector4d::Zero(),
+                  block, gradient);
+    return gradient;
+  }
+  const int last = path.stage_count - 1;
+  const LocalRow row = gradients.row(last);
+  const auto state = [&](const LocalColumns& columns) -> Eigen::Vector4d {
+    return row.segment<4>(columns.xi).matrix().transpose();
+  };
+  adjoint_sweep(path, gradients, path.sensor_stages, last, kLightColumns, state(kLightColumns),
+                block, gradient);
+  adjoint_sweep(path, gradients, 0, path.sensor_stages, kSensorColumns, state(kSensorColumns),
+                block, gradient);
   return gradient;
 }
 
@@ -134,21 +153,39 @@ class StageVisitor : public VisitorPair<Jet, First, Second> {
     delta_ = true;
   }
 
+  void light_delta(const ScatterEvent<Jet>& e) {
+    Base::light_delta(e);
+    delta_ = true;
+  }
+
+  void light_side() {
+    columns_ = kLightColumns;
+    result_.sensor_stages = result_.stage_count;
+  }
+
+  void leave_point(Vec3<Jet>& y) {
+    Stage& stage = close_stage();
+    stage.kind = Stage::Kind::Point;
+    stage.has_block = true;
+    const Chart::Block& block = chart_.block(block_++);
+    seed(y, columns_.xi, block.t, block.b);
+  }
+
   void depart(Ray<Jet>& ray, const Vec3<Jet>& normal) {
     Stage& stage = close_stage();
     const TangentBasis plane = tangent_basis(value(normal));
     stage.position = map(ray.origin, plane.t, plane.b);
-    seed(ray.origin, kXi, plane.t, plane.b);
+    seed(ray.origin, columns_.xi, plane.t, plane.b);
     stage.has_block = !delta_;
     if (delta_) {
       stage.kind = Stage::Kind::Delta;
       const TangentBasis basis = tangent_basis(value(ray.direction));
       stage.direction = map(ray.direction, basis.t, basis.b);
-      seed(ray.direction, kOmega, basis.t, basis.b);
+      seed(ray.direction, columns_.omega, basis.t, basis.b);
     } else {
       stage.kind = Stage::Kind::Free;
       const Chart::Block& block = chart_.block(block_++);
-      seed(ray.direction, kOmega, block.t, block.b);
+      seed(ray.direction, columns_.omega, block.t, block.b);
     }
     delta_ = false;
   }
@@ -172,10 +209,11 @@ class StageVisitor : public VisitorPair<Jet, First, Second> {
   }
 
   /// Coordinates in (t, b) of the derivatives by (xi, omega).
-  static Stage::Map map(const Vec3<Jet>& x, const Vec3d& t, const Vec3d& b) {
+  Stage::Map map(const Vec3<Jet>& x, const Vec3d& t, const Vec3d& b) const {
+    const int xi = columns_.xi;
     Stage::Map m;
-    m.row(0) = (t.x() * x.x().v + t.y() * x.y().v + t.z() * x.z().v).head<4>();
-    m.row(1) = (b.x() * x.x().v + b.y() * x.y().v + b.z() * x.z().v).head<4>();
+    m.row(0) = (t.x() * x.x().v + t.y() * x.y().v + t.z() * x.z().v).segment<4>(xi);
+    m.row(1) = (b.x() * x.x().v + b.y() * x.y().v + b.z() * x.z().v).segment<4>(xi);
     return m;
   }
 
@@ -183,6 +221,7 @@ class StageVisitor : public VisitorPair<Jet, First, Second> {
   const RowSink& sink_;
   Linearization& result_;
   LocalGradients gradients_;
+  LocalColumns columns_ = kSensorColumns;
   int block_ = 0;
   bool delta_ = false;
 };
@@ -193,10 +232,11 @@ void linearize_by_jets(const Scene& scene, const PathTopology& topology, const C
                        const DerivativeRequest& request, Linearization& result) {
   result.stage_count = 0;
   result.block_count = chart.block_count();
+  result.has_light_side = topology.has_light_side();
   result.gradient.resize(0);
   RowSink sink(result);
   const auto run = [&](auto visitor) {
-    walk<Jet>(scene, topology, LocalBlocks(chart), visitor);
+    walk<Jet>(scene, topology, LocalBlocks(chart, topology.camera_block_count()), visitor);
     visitor.finish();
   };
   if (request.gradient && request.constraints)

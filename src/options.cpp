@@ -78,6 +78,8 @@ OptionEntry choice(std::string_view name, Enum& field, const std::array<std::str
           }};
 }
 
+constexpr std::array<std::string_view, 2> kPhaseSpaces{"directions", "bidirectional"};
+
 OptionEntry max_depth(int& field) {
   return number("max_depth", field, Range<int>{1, kMaxPathLength}, "longest path, in edges");
 }
@@ -95,7 +97,12 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
   constexpr std::array<std::string_view, 2> kMethods{"jet", "hand"};
   const Range<double> positive{.low = 0, .open = true};
   KernelOptions& kernel = options.kernel;
+  RedistributionOptions& redistribution = options.redistribution;
   return {
+      choice("mode", options.mode, std::array<std::string_view, 2>{"chain", "redistribution"},
+             "who carries light: chains, or samples whose rare heavy ones chains spread"),
+      choice("phase_space", options.phase_space, kPhaseSpaces,
+             "coordinates of a path: directions from the sensor, or from both ends"),
       choice("drift", kernel.drift, kDrifts,
              "drift of a small step: Brownian, -T T* grad U, or that + div(T T*)"),
       choice("preconditioner", kernel.preconditioner, kPreconditioners,
@@ -114,6 +121,12 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
              "where independent proposals come from: the sensor, or both ends"),
       choice("direct", options.direct, std::array<std::string_view, 2>{"chain", "apart"},
              "paths of 1 and 2 edges: by the chains, or by a path tracer in a pass of its own"),
+      number("threshold", redistribution.threshold, positive,
+             "redistribution: samples keep so many times the local brightness"),
+      number("chain_length", redistribution.chain_length, Range<int>{1, 1000000},
+             "redistribution: mutations of a chain"),
+      number("mutations_per_sample", redistribution.mutations_per_sample, positive,
+             "redistribution: most mutations for each sample, in the mean"),
       number("chains", options.chains, Range<int>{1, 1000000},
              "independent chains; the image depends on it, not on the threads"),
       number("bootstrap", options.bootstrap, Range<int>{1, 1000000000},
@@ -134,6 +147,10 @@ std::vector<OptionEntry> entries(BdptOptions& options) {
 }
 
 std::vector<OptionEntry> entries(LightOptions& options) { return {max_depth(options.max_depth)}; }
+
+std::string_view name_of(PhaseSpace phase_space) {
+  return kPhaseSpaces.at(static_cast<std::size_t>(phase_space));
+}
 
 void LangevinOptions::validate() const {
   LangevinOptions copy = *this;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "driftlight/path_class.h"
 
-#include <vector>
+#include <array>
 
 #include "driftlight/walk.h"
 
@@ -58,18 +58,35 @@ class Collector : public WalkVisitor<double> {
   /// Scattering events and the end, runs of equal ones collapsed.
   std::string sequence() const {
     std::string text;
-    for (std::size_t i = 0; i < events_.size();) {
+    for (std::size_t i = 0; i < count_;) {
       std::size_t run = 1;
-      while (i + run < events_.size() && events_[i + run] == events_[i]) ++run;
+      while (i + run < count_ && events_[i + run] == events_[i]) ++run;
       text += events_[i] + (run > 1 ? " x" + std::to_string(run) : "") + " > ";
       i += run;
     }
     return text + end_;
   }
 
+  void vertex(int k) { index_ = static_cast<std::size_t>(k); }
   void scatter(const ScatterEvent<double>& e) { add_event(e); }
   void connect(const ScatterEvent<double>& e) { add_event(e); }
   void delta(const ScatterEvent<double>& e) { add_event(e); }
+  void light_scatter(const ScatterEvent<double>& e) { add_light_event(e); }
+  void light_delta(const ScatterEvent<double>& e) { add_light_event(e); }
+  void light_connect(const ScatterEvent<double>& e) {
+    classes_.insert(index_ == 0 ? "joined to the sensor" : "joined between surfaces");
+    add_light_event(e);
+  }
+  void area_emission(const AreaEmitter& emitter, const Vec3d&, const Vec3d&) {
+    end("emission from " + kind_of(scene_.shapes()[emitter.shape]));
+  }
+  void point_emission(const Emitter& emitter, const Vec3d&) {
+    end(std::holds_alternative<SpotEmitter>(emitter) ? "emission from spot"
+                                                     : "emission from point");
+  }
+  void directional_emission(const DirectionalEmitter&, const Vec3d&) {
+    end("emission from directional");
+  }
   void hit(const AreaEmitter& emitter, const double&, const double&) {
     end("hit " + kind_of(scene_.shapes()[emitter.shape]));
   }
@@ -77,16 +94,17 @@ class Collector : public WalkVisitor<double> {
   void area_connection(const AreaEmitter& emitter, const double&, const double&) {
     end("connection to " + kind_of(scene_.shapes()[emitter.shape]));
   }
-  void point_connection(const PointEmitter&, const double&) {
-    end("connection to point");
-    classes_.insert("connection to point after " + last_lobe_);
+  void point_connection(const Emitter& emitter, const Vec3d&, const double&) {
+    delta_end(std::holds_alternative<SpotEmitter>(emitter) ? "spot" : "point");
   }
+  void directional_connection(const DirectionalEmitter&) { delta_end("directional"); }
 
  private:
   void add_event(const ScatterEvent<double>& e) {
     last_lobe_ = lobe(e);
     const std::string on = " on " + surface(e.shape);
-    events_.push_back(last_lobe_ + on);
+    events_.at(index_) = last_lobe_ + on;
+    ++count_;
     classes_.insert(last_lobe_);
     classes_.insert(on.substr(1));
     const auto* mesh = std::get_if<TriangleMesh>(&e.shape.geometry);
@@ -95,6 +113,15 @@ class Collector : public WalkVisitor<double> {
     const Material& material = scene_.materials()[e.shape.material];
     if (material.back && &e.bsdf == &scene_.bsdfs()[*material.back]) classes_.insert("on back");
   }
+  void add_light_event(const ScatterEvent<double>& e) {
+    add_event(e);
+    events_.at(index_) += " by light";
+    classes_.insert(last_lobe_ + " by light");
+  }
+  void delta_end(const std::string& emitter) {
+    end("connection to " + emitter);
+    classes_.insert("connection to " + emitter + " after " + last_lobe_);
+  }
   void end(const std::string& what) {
     end_ = what;
     classes_.insert(what);
@@ -102,7 +129,9 @@ class Collector : public WalkVisitor<double> {
 
   const Scene& scene_;
   std::set<std::string> classes_;
-  std::vector<std::string> events_;
+  std::array<std::string, kMaxPathLength> events_;
+  std::size_t count_ = 0;
+  std::size_t index_ = 0;
   std::string last_lobe_;
   std::string end_;
 };
@@ -129,10 +158,15 @@ std::string kind_of(const Shape& shape) {
 }
 
 std::string kind_of(const Emitter& emitter) {
-  if (std::holds_alternative<AreaEmitter>(emitter)) return "area emitter";
-  if (std::holds_alternative<PointEmitter>(emitter)) return "point emitter";
-  return std::holds_alternative<EnvironmentMap>(emitter) ? "environment map"
-                                                         : "constant environment";
+  struct Kind {
+    std::string operator()(const AreaEmitter&) const { return "area emitter"; }
+    std::string operator()(const PointEmitter&) const { return "point emitter"; }
+    std::string operator()(const ConstantEnvironment&) const { return "constant environment"; }
+    std::string operator()(const EnvironmentMap&) const { return "environment map"; }
+    std::string operator()(const SpotEmitter&) const { return "spot emitter"; }
+    std::string operator()(const DirectionalEmitter&) const { return "directional emitter"; }
+  };
+  return std::visit(Kind{}, emitter);
 }
 
 std::set<std::string> classes_of(const Scene& scene, const PathTopology& topology,

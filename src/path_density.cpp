@@ -2,14 +2,23 @@
 #include "path_density.h"
 
 #include <cmath>
+#include <optional>
 
 #include "driftlight/walk.h"
 
 namespace driftlight {
 namespace {
 
+/// Density of the direction v by emission from a point or spot emitter.
+double emission_density(const Emitter& light, const Vec3d& v) {
+  if (const auto* spot = std::get_if<SpotEmitter>(&light))
+    return spot->falloff(v) / spot->solid_angle();
+  return 1.0 / std::get<PointEmitter>(light).solid_angle();
+}
+
 /// What the densities need of a scattering vertex x_k, k >= 1.
 struct Vertex {
+  Vec3d p;
   double forward;     ///< C_k
   double backward;    ///< l_k: density of the direction toward the sensor; of a delta lobe P
   double cosine_in;   ///< of the edge from the sensor's side
@@ -21,7 +30,8 @@ struct Vertex {
 
 class Recorder : public WalkVisitor<double> {
  public:
-  explicit Recorder(const Scene& scene) : scene_(scene), last_(scene.camera().origin) {}
+  Recorder(const Scene& scene, const PathTopology& topology)
+      : scene_(scene), scatter_count_(topology.scatter_count), last_(scene.camera().origin) {}
 
   void sensor(const PerspectiveCamera& camera, const Vec3d& v) {
     importance = std::exp(camera.log_importance(v));
@@ -65,28 +75,73 @@ class Recorder : public WalkVisitor<double> {
     const double direction = map != nullptr ? map->pdf(v) : 0.25 * kInvPi;
     connected = direction;
     emitted = direction * kInvPi / (scene_.radius() * scene_.radius());
-    r2_end = 1.0;
   }
-  void point_connection(const PointEmitter&, const double& squared) {
+  void point_connection(const Emitter& light, const Vec3d& wo, const double& squared) {
     connected = 1.0;
-    emitted = 0.25 * kInvPi / squared;
+    emitted = emission_density(light, Vec3d(-wo)) / squared;
     can_hit = false;
-    r2_end = squared;
+  }
+  void directional_connection(const DirectionalEmitter&) {
+    connected = 1.0;
+    emitted = kInvPi / (scene_.radius() * scene_.radius());
+    can_hit = false;
+  }
+
+  void vertex(int k) { index_ = static_cast<std::size_t>(k); }
+  void light_scatter(const ScatterEvent<double>& e) {
+    scatter(e);
+    measure *= vertices[index_].cosine_in / vertices[index_].cosine_out;
+  }
+  void light_connect(const ScatterEvent<double>& e) { light_scatter(e); }
+  void light_delta(const ScatterEvent<double>& e) {
+    delta(e);
+    measure /= vertices[index_].etendue;
+  }
+  void area_emission(const AreaEmitter& light, const Vec3d& normal, const Vec3d& v) {
+    const double cosine = normal.dot(v);
+    area_end(light, cosine, 1.0);
+    end_ = last_;
+    measure = cosine;
+  }
+  void point_emission(const Emitter& light, const Vec3d& v) {
+    emitted = emission_density(light, v);
+    connected = 1.0;
+    end_ = position_of(light);
+    can_hit = false;
+  }
+  void directional_emission(const DirectionalEmitter& light, const Vec3d&) {
+    directional_connection(light);
+  }
+  /// All vertices are known: their distances in order from the sensor.
+  void joined(const double& squared) {
+    measure /= squared;
+    const Vec3d* from = &scene_.camera().origin;
+    for (std::size_t k = 0; k < scatter_count_; ++k) {
+      vertices[k].r2 = (vertices[k].p - *from).squaredNorm();
+      from = &vertices[k].p;
+    }
+    if (!end_) return;
+    const double end_r2 = (*end_ - *from).squaredNorm();
+    if (can_hit) {
+      connected *= end_r2;
+    } else {
+      emitted /= end_r2;
+      measure *= end_r2;
+    }
   }
 
   std::array<Vertex, kMaxPathLength> vertices;
-  int count = 0;
   double importance = 1;  ///< C_0
   double r2 = 1;          ///< of the last edge to a surface
-  double measure = 1;     ///< d omega_{n-1} / (measure of the coordinates)
+  double measure = 1;     ///< camera-side measure / (measure of the coordinates)
   double connected = 0;   ///< density of x_n by s = 1, per d omega_{n-1}
   double emitted = 0;     ///< density of x_n and of its direction, for s >= 2, as l_n / cos_n
-  double r2_end = 1;
   bool can_hit = true;
 
  private:
   Vertex& add(const ScatterEvent<double>& e) {
-    Vertex& x = vertices[static_cast<std::size_t>(count++)];
+    Vertex& x = vertices[index_];
+    x.p = e.at.p;
     x.cosine_in = std::abs(e.at.n_g.dot(e.wi));
     x.cosine_out = std::abs(e.at.n_g.dot(e.wo));
     x.r2 = r2;
@@ -97,18 +152,20 @@ class Recorder : public WalkVisitor<double> {
     const double per_area = 1.0 / scene_.shapes()[light.shape].extent.area;
     connected = per_area * squared / cosine;
     emitted = per_area * kInvPi;
-    r2_end = squared;
   }
 
   const Scene& scene_;
+  std::size_t scatter_count_;
+  std::size_t index_ = 0;
   Vec3d last_;
+  std::optional<Vec3d> end_;  ///< the point that a light side begins at
 };
 
 }  // namespace
 
 StrategyDensities strategy_densities(const Scene& scene, const PathTopology& topology,
                                      const PathCoordinates& coordinates) {
-  Recorder path(scene);
+  Recorder path(scene, topology);
   walk<double>(scene, topology, coordinates, path);
   const int n = topology.length();
   const auto vertex = [&](int k) -> const Vertex& {
@@ -133,7 +190,8 @@ StrategyDensities strategy_densities(const Scene& scene, const PathTopology& top
   for (int t = n - 1; t >= 1; --t) {
     const Vertex& x = vertex(t);
     if (x.delta) {
-      if (topology.end == PathEnd::PointConnection && t == n - 1) return result;
+      const bool no_chart = topology.ends_at_delta_emitter() && !topology.has_light_side();
+      if (no_chart && t == n - 1) return result;
       suffix *= x.backward * x.etendue;
       continue;
     }

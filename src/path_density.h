@@ -19,8 +19,9 @@
 /// - The connection joins two non-delta vertices: dA_t / d omega_{t-1} = r^2 / cos_t.
 /// Ends: an area emitter has p(x_n) = 1 / area and l_n = cos_n / pi; an environment is drawn by
 /// direction, p(omega), and by the point where the ray crosses a disk of the scene's radius R,
-/// which gives p(omega) / (pi R^2) in place of l_n / cos_n; a point emitter has no area to convert,
-/// l_n = 1 / (4 pi), p(dA_a | x_n) = l_n cos_a / r^2.
+/// which gives p(omega) / (pi R^2) in place of l_n / cos_n; a point or spot emitter has no area to
+/// convert, p(dA_a | x_n) = l_n cos_a / r^2 with l_n = 1 / (4 pi) or falloff / (its integral); a
+/// directional emitter has its one direction, p(dA_a) = cos_a / (pi R^2).
 #pragma once
 
 #include <array>
@@ -35,7 +36,10 @@ struct StrategyDensities {
 };
 
 /// In the measure of the path's coordinates: with an emitter point among them (AreaConnection),
-/// d omega of the last direction becomes dA.
+/// d omega of the last direction becomes dA. With a light side the factors above turn camera-side
+/// solid angles into dA d omega of the emitter, as in contribution.h; a point emitter has its d
+/// omega in the place of dA of the first vertex behind it. There a delta vertex is no obstacle:
+/// what the chain behind the point makes of d omega is the same for all strategies.
 StrategyDensities strategy_densities(const Scene& scene, const PathTopology& topology,
                                      const PathCoordinates& coordinates);
 

@@ -110,12 +110,14 @@ class Estimator {
     const Vec2d square = rng.uniform2();
     const Emitter& emitter = scene_.emitters()[index];
     if (is_environment(emitter)) return direct_environment(at, emitter, square);
+    if (const auto* parallel = std::get_if<DirectionalEmitter>(&emitter))
+      return direct_parallel(at, *parallel) / choice;
     EmitterPoint y;
     const auto* light = std::get_if<AreaEmitter>(&emitter);
     if (light != nullptr)
       y = scene_.sample_area(*light, square.x(), square.y());
     else
-      y.p = std::get<PointEmitter>(emitter).position;
+      y.p = position_of(emitter);
     const Vec3d edge = y.p - at.at.p;
     const double r2 = edge.squaredNorm();
     const Vec3d wo = edge / std::sqrt(r2);
@@ -123,12 +125,28 @@ class Estimator {
     const Rgbd f = color_of(eval(*at.bsdf, at.surface(), at.wi, wo));
     if (!(f.maxCoeff() > 0.0)) return Rgbd::Zero();
     if (connection_status(scene_, at, emitter, y) != TraceStatus::Ok) return Rgbd::Zero();
-    if (light == nullptr) return f * std::get<PointEmitter>(emitter).intensity / (r2 * choice);
+    if (light == nullptr) return f * intensity(emitter, -wo) / (r2 * choice);
     const double cosine = -y.n.dot(wo);
     const double density =
         choice / scene_.shapes()[light->shape].extent.area * r2 / cosine;  // per solid angle
     const double w = balance(density, pdf(*at.bsdf, at.surface(), at.wi, wo));
     return w / density * f * light->radiance;
+  }
+
+  /// Of a point or spot emitter along the unit direction v.
+  static Rgbd intensity(const Emitter& emitter, const Vec3d& v) {
+    const auto* spot = std::get_if<SpotEmitter>(&emitter);
+    if (spot != nullptr) return spot->intensity() * spot->falloff(v);
+    return std::get<PointEmitter>(emitter).intensity;
+  }
+
+  Rgbd direct_parallel(const SurfaceHit& at, const DirectionalEmitter& emitter) const {
+    const Vec3d wo = -emitter.direction;
+    if (!passes(at.at, at.wi, wo)) return Rgbd::Zero();
+    const Rgbd f = color_of(eval(*at.bsdf, at.surface(), at.wi, wo));
+    if (!(f.maxCoeff() > 0.0)) return Rgbd::Zero();
+    if (infinity_status(scene_, at, wo) != TraceStatus::Ok) return Rgbd::Zero();
+    return f * emitter.irradiance;
   }
 
   Rgbd direct_environment(const SurfaceHit& at, const Emitter& emitter, const Vec2d& u) const {

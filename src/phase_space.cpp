@@ -3,14 +3,19 @@
 
 #include <cmath>
 
+#include "bidirectional_trace.h"
+#include "driftlight/chart_rule.h"
 #include "driftlight/walk.h"
 #include "ray_follower.h"
 
 namespace driftlight {
 
+bool has_points(const Shape& emitter) {
+  return emitter.extent.planar || std::holds_alternative<Sphere>(emitter.geometry);
+}
+
 bool connects_to_area(const Bsdf& last, const Shape& emitter) {
-  return is_diffuse(last) &&
-         (emitter.extent.planar || std::holds_alternative<Sphere>(emitter.geometry));
+  return is_diffuse(last) && has_points(emitter);
 }
 
 bool passes(const Interaction<double>& at, const Vec3d& wi, const Vec3d& wo) {
@@ -30,7 +35,9 @@ class Tracer {
         result_(result),
         follower_(scene, coordinates(0)) {
     result_.scatter_count = pattern.scatter_count;
+    result_.light_count = 0;
     result_.block_count = pattern.block_count;
+    result_.phase_space = pattern.phase_space;
     result_.end = pattern.end;
     result_.emitter = pattern.emitter;
   }
@@ -41,13 +48,21 @@ class Tracer {
       const TraceStatus status = scatter(k);
       if (status != TraceStatus::Ok) return status;
     }
-    if (pattern_.end == PathEnd::Hit) return hit_emitter();
+    TraceStatus status = TraceStatus::Ok;
+    if (pattern_.end == PathEnd::Hit) status = hit_emitter();
     if (pattern_.end == PathEnd::Environment && follower_.next_hit().valid())
-      return TraceStatus::Occluded;
-    return TraceStatus::Ok;
+      status = TraceStatus::Occluded;
+    return status == TraceStatus::Ok && !keeps_chart() ? TraceStatus::OtherLobe : status;
   }
 
  private:
+  /// With PhaseSpace::Directions the lobe before the emitter decides, which is checked there.
+  bool keeps_chart() const {
+    if (pattern_.phase_space == PhaseSpace::Directions) return true;
+    const std::span<const Lobe> lobes(lobes_.data(), pattern_.scatter_count);
+    return light_side(pattern_.phase_space, scene_, lobes, result_.emitter) == 0;
+  }
+
   /// Finds vertex k and what lies beyond: the ray that leaves it or the connection to the emitter.
   TraceStatus scatter(int k) {
     const auto index = static_cast<std::size_t>(k);
@@ -60,6 +75,7 @@ class Tracer {
     result_.vertices[index] = wanted;
     result_.vertices[index].hit = hit;
     bsdf_ = surface.bsdf;
+    lobes_[index] = lobe_of(*surface.bsdf);
     if (pattern_.ends_in_connection() && k + 1 == pattern_.scatter_count)
       return connect(surface, wanted);
 
@@ -80,6 +96,7 @@ class Tracer {
 
   TraceStatus connect(const SurfaceHit& surface, const PathVertex& wanted) {
     const Emitter& emitter = scene_.emitters()[pattern_.emitter];
+    if (pattern_.end == PathEnd::DirectionalConnection) return connect_to_infinity(surface, wanted);
     EmitterPoint y;
     if (const auto* light = std::get_if<AreaEmitter>(&emitter)) {
       const Shape& shape = scene_.shapes()[light->shape];
@@ -87,12 +104,20 @@ class Tracer {
       y.p = coordinates_(next_block_);
       y.n = emitter_normal(shape, y.p);
     } else {
-      y.p = std::get<PointEmitter>(emitter).position;
+      y.p = position_of(emitter);
     }
     const Vec3d edge = y.p - surface.at.p;
     if (surface.side(edge) != wanted.scattering) return TraceStatus::OtherLobe;
     if (!passes(surface.at, surface.wi, edge)) return TraceStatus::Missed;
     return connection_status(scene_, surface, emitter, y);
+  }
+
+  TraceStatus connect_to_infinity(const SurfaceHit& surface, const PathVertex& wanted) {
+    const auto& light = std::get<DirectionalEmitter>(scene_.emitters()[pattern_.emitter]);
+    const Vec3d wo = -light.direction;
+    if (surface.side(wo) != wanted.scattering) return TraceStatus::OtherLobe;
+    if (!passes(surface.at, surface.wi, wo)) return TraceStatus::Missed;
+    return infinity_status(scene_, surface, wo);
   }
 
   TraceStatus hit_emitter() {
@@ -113,34 +138,49 @@ class Tracer {
   RayFollower follower_;
   int next_block_ = 1;
   const Bsdf* bsdf_ = nullptr;  ///< of the last scattering vertex so far
+  std::array<Lobe, kMaxPathLength> lobes_;
 };
 
 }  // namespace
 
 TraceStatus trace(const Scene& scene, const PathTopology& pattern,
                   const PathCoordinates& coordinates, PathTopology& result) {
+  if (pattern.has_light_side()) return trace_from_both_ends(scene, pattern, coordinates, result);
   return Tracer(scene, pattern, coordinates, result).run();
 }
 
 // ---- Chart ----------------------------------------------------------------------------------
 
+namespace {
+
+/// A block that is a point on an emitter, or on the disk across parallel light.
+void set_point(const Scene& scene, const Emitter& emitter, Chart::Block& block) {
+  if (const auto* parallel = std::get_if<DirectionalEmitter>(&emitter)) {
+    block.radius = 0.0;
+    block.normal = parallel->direction;
+    block.length = scene.radius();
+    return;
+  }
+  const Shape& shape = scene.shapes()[std::get<AreaEmitter>(emitter).shape];
+  const auto* sphere = std::get_if<Sphere>(&shape.geometry);
+  block.radius = sphere != nullptr ? sphere->radius : 0.0;
+  block.normal = sphere != nullptr ? Vec3d((block.point - sphere->center).normalized())
+                                   : emitter_normal(shape, block.point);
+  block.length = shape.extent.radius;
+}
+
+}  // namespace
+
 Chart::Chart(const Scene& scene, const PathTopology& topology, const PathCoordinates& coordinates)
     : count_(topology.block_count) {
+  const int point_block = topology.point_block();
   for (int k = 0; k < count_; ++k) {
     Block& block = blocks_[static_cast<std::size_t>(k)];
     block.point = coordinates(k);
     block.normal = block.point;
     block.radius = 1.0;
     block.length = 1.0;
-    if (topology.end == PathEnd::AreaConnection && k + 1 == count_) {
-      const auto& light = std::get<AreaEmitter>(scene.emitters()[topology.emitter]);
-      const Shape& shape = scene.shapes()[light.shape];
-      const auto* sphere = std::get_if<Sphere>(&shape.geometry);
-      block.radius = sphere != nullptr ? sphere->radius : 0.0;
-      block.normal = sphere != nullptr ? Vec3d((block.point - sphere->center).normalized())
-                                       : emitter_normal(shape, block.point);
-      block.length = shape.extent.radius;
-    }
+    if (k == point_block) set_point(scene, scene.emitters()[topology.emitter], block);
     const TangentBasis basis = tangent_basis(block.normal);
     block.t = block.length * basis.t;
     block.b = block.length * basis.b;

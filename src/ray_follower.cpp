@@ -6,6 +6,9 @@ namespace driftlight {
 TraceStatus connection_status(const Scene& scene, const SurfaceHit& from, const Emitter& emitter,
                               const EmitterPoint& y) {
   const Vec3d edge = y.p - from.at.p;
+  const auto* spot = std::get_if<SpotEmitter>(&emitter);
+  if (spot != nullptr && !(spot->falloff(Vec3d(-edge.normalized())) > 0.0))
+    return TraceStatus::Missed;
   const Vec3d start = scene.leave(from.at.p, from.at.n_g, edge);
   const auto* light = std::get_if<AreaEmitter>(&emitter);
   if (light == nullptr) return scene.occluded(start, y.p) ? TraceStatus::Occluded : TraceStatus::Ok;
@@ -18,6 +21,11 @@ TraceStatus connection_status(const Scene& scene, const SurfaceHit& from, const 
   if (hit.shape != light->shape) return TraceStatus::Occluded;
   const double error = (scene.interact(hit, ray).p - y.p).norm();
   return error < 1e-3 * edge.norm() ? TraceStatus::Ok : TraceStatus::Occluded;
+}
+
+TraceStatus infinity_status(const Scene& scene, const SurfaceHit& from, const Vec3d& wo) {
+  const Vec3d start = scene.leave(from.at.p, from.at.n_g, wo);
+  return scene.occluded_to_infinity(start, wo) ? TraceStatus::Occluded : TraceStatus::Ok;
 }
 
 }  // namespace driftlight

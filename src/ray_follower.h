@@ -69,9 +69,12 @@ class RayFollower {
   double t_max_;
 };
 
-/// Whether light passes straight from the point y of a point or area emitter to a surface point.
-/// Missed: y shows its back, or something that is not y is seen in its direction on the same shape.
+/// Whether light passes straight from the point y of a point, spot or area emitter to a surface
+/// point. Missed: the point lies outside of a spot's cone, y shows its back, or something that is
+/// not y is seen in its direction on the same shape.
 TraceStatus connection_status(const Scene& scene, const SurfaceHit& from, const Emitter& emitter,
                               const EmitterPoint& y);
+/// Whether light passes from infinity, out of the unit direction wo; Ok or Occluded.
+TraceStatus infinity_status(const Scene& scene, const SurfaceHit& from, const Vec3d& wo);
 
 }  // namespace driftlight

@@ -15,6 +15,7 @@
 #include "driftlight/error.h"
 #include "driftlight/film.h"
 #include "path_tracer.h"
+#include "redistribution.h"
 #include "stopwatch.h"
 
 namespace driftlight {
@@ -68,13 +69,7 @@ class DirectPass {
   double ratio() const { return ratio_; }
 
   /// Mean luminance so far.
-  double mean() const {
-    const Image image = sums_.image(passes_);
-    double sum = 0;
-    for (std::size_t i = 0; i < image.rgb.size(); ++i)
-      sum += kLuminance[static_cast<Eigen::Index>(i % 3)] * static_cast<double>(image.rgb[i]);
-    return 3.0 * sum / static_cast<double>(image.rgb.size());
-  }
+  double mean() const { return mean_luminance(sums_.image(passes_)); }
   /// Adds what it has rendered.
   void finish(LangevinResult& result) const {
     const Image own = sums_.image(passes_);
@@ -180,7 +175,8 @@ struct Chains {
   Chains(const Scene& scene, const LangevinOptions& options, const RenderOptions& render,
          int min_depth, Film& film) {
     if (min_depth > options.max_depth) return;
-    sampler.emplace(scene, options.max_depth, options.large_steps, min_depth);
+    sampler.emplace(scene, options.max_depth, options.large_steps, min_depth,
+                    options.phase_space);
     const Bootstrap bootstrap(*sampler, scene, options.bootstrap, render.seed);
     weights = bootstrap.weights();
     if (!(weights.sum > 0.0)) return;
@@ -251,11 +247,14 @@ LangevinResult run_langevin(const Scene& scene, const LangevinOptions& options,
 }  // namespace
 
 LangevinResult render_langevin(const Scene& scene, const LangevinOptions& options,
-                               const RenderOptions& render, double mutations_per_pixel) {
+                               const RenderOptions& render, double work) {
   options.validate();
   LangevinResult result;
   tbb::task_arena arena(render.threads > 0 ? render.threads : tbb::task_arena::automatic);
-  arena.execute([&] { result = run_langevin(scene, options, render, mutations_per_pixel); });
+  arena.execute([&] {
+    result = options.mode == Mode::Chain ? run_langevin(scene, options, render, work)
+                                         : render_redistribution(scene, options, render, work);
+  });
   return result;
 }
 

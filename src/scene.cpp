@@ -363,6 +363,10 @@ std::uint32_t SceneBuilder::add_shape(Geometry geometry, std::uint32_t material,
 }
 
 void SceneBuilder::add_emitter(PointEmitter emitter) { scene_.emitters_.emplace_back(emitter); }
+void SceneBuilder::add_emitter(SpotEmitter emitter) { scene_.emitters_.emplace_back(emitter); }
+void SceneBuilder::add_emitter(DirectionalEmitter emitter) {
+  scene_.emitters_.emplace_back(emitter);
+}
 
 void SceneBuilder::set_environment(Emitter environment) {
   if (scene_.environment_) throw InputError("a scene can have one environment emitter only");
@@ -382,7 +386,13 @@ double power(const Emitter& emitter, std::span<const Shape> shapes, double scene
     double operator()(const AreaEmitter& e) const {
       return luminance(e.radiance) * shapes[e.shape].extent.area * kPi;
     }
-    double operator()(const PointEmitter& e) const { return luminance(e.intensity) * 4.0 * kPi; }
+    double operator()(const PointEmitter& e) const {
+      return luminance(e.intensity) * e.solid_angle();
+    }
+    double operator()(const SpotEmitter& e) const {
+      return luminance(e.intensity()) * e.solid_angle();
+    }
+    double operator()(const DirectionalEmitter& e) const { return luminance(e.irradiance) * disk; }
     double operator()(const ConstantEnvironment& e) const {
       return luminance(e.radiance) * 4.0 * kPi * disk;
     }
@@ -408,7 +418,7 @@ Scene SceneBuilder::build() {
     box.extend(std::visit([](const auto& s) { return bounds_of(s); }, shape.geometry));
   }
   for (const Emitter& emitter : scene.emitters_)
-    if (const auto* point = std::get_if<PointEmitter>(&emitter)) box.extend(point->position);
+    if (is_point(emitter)) box.extend(position_of(emitter));
   if (!box.isEmpty()) {
     scene.center_ = box.center();
     scene.radius_ = 0.5 * box.diagonal().norm();

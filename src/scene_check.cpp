@@ -26,8 +26,8 @@ bool has_light(const Scene& scene, const PathSampler::Sample& path) {
   return carries_light(contribution(scene, path.topology, path.coordinates).log_target);
 }
 
-PathSampler sampler_of(const Scene& scene, int max_depth) {
-  return {scene, max_depth, LangevinOptions{}.large_steps};
+PathSampler sampler_of(const Scene& scene, int max_depth, PhaseSpace phase_space) {
+  return {scene, max_depth, LangevinOptions{}.large_steps, 1, phase_space};
 }
 
 std::optional<PathSampler::Sample> draw(const Scene& scene, const PathSampler& sampler,
@@ -80,6 +80,9 @@ class PartsVisitor : public WalkVisitor<double> {
   void scatter(const ScatterEvent<double>& e) { add(e); }
   void connect(const ScatterEvent<double>& e) { add(e); }
   void delta(const ScatterEvent<double>& e) { add(e); }
+  void light_scatter(const ScatterEvent<double>& e) { add(e); }
+  void light_delta(const ScatterEvent<double>& e) { add(e); }
+  void light_connect(const ScatterEvent<double>& e) { add(e); }
 
   const std::set<std::string>& parts() const { return parts_; }
 
@@ -124,7 +127,7 @@ class SceneChecker {
       : scene_(scene),
         options_(options),
         functions_(functions),
-        sampler_(sampler_of(scene, options.max_depth)),
+        sampler_(sampler_of(scene, options.max_depth, options.phase_space)),
         missing_(parts_of(scene)) {}
 
   SceneCheck run() {
@@ -245,8 +248,9 @@ SceneCheck check_scene(const Scene& scene, const SceneCheckOptions& options,
 }
 
 std::optional<PathSampler::Sample> draw_light_path(const Scene& scene, int max_depth,
-                                                   std::uint64_t seed, std::uint64_t index) {
-  return draw(scene, sampler_of(scene, max_depth), seed, index);
+                                                   std::uint64_t seed, std::uint64_t index,
+                                                   PhaseSpace phase_space) {
+  return draw(scene, sampler_of(scene, max_depth, phase_space), seed, index);
 }
 
 }  // namespace driftlight

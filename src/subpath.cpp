@@ -60,15 +60,16 @@ Departure SubpathTracer::leave_sensor(const Vec3d& v) const {
   return from;
 }
 
-/// L cos / (p(y) p(omega)); the strategy s = 0 gives up y if it can be hit.
+/// L cos / (p(y) p(omega)), with a spot's falloff; the strategy s = 0 gives up y if it can be hit.
 Departure SubpathTracer::leave_light(const LightEnd& end, const Emission& emission) const {
   Departure from;
   from.p = end.p;
   from.direction = emission.direction;
-  from.at_infinity = end.kind == LightEnd::Kind::Environment;
+  from.at_infinity = end.at_infinity();
   from.cosine = emission.cosine;
-  from.density = emission_density(scene_, end, emission.cosine);
-  from.throughput = end.emitted * (emission.cosine / (end.density * from.density));
+  from.density = emission_density(scene_, end, emission.cosine, emission.falloff);
+  from.throughput =
+      end.emitted * (emission.falloff * emission.cosine / (end.density * from.density));
   from.others = end.can_be_hit() ? 1.0 / power_(end.density) : 0.0;
   from.connects = true;
   return from;
@@ -82,6 +83,7 @@ SubpathVertex SubpathTracer::arrive(const Departure& from, const SurfaceHit& sur
   x.others = power_(from.cosine * inverse_r2) * from.others;
   x.previous_connects = from.connects;
   x.throughput = from.throughput;
+  x.roulette = from.roulette;
   x.delta = surface.bsdf != nullptr && is_delta(*surface.bsdf);
   return x;
 }
@@ -113,6 +115,7 @@ Departure SubpathTracer::depart(Walk walk, const SubpathVertex& x, const BsdfSam
   double factor = forward > 0.0 ? 1.0 / forward : 0.0;
   if (!from_sensor) factor *= from.cosine / std::abs(at.at.n_g.dot(at.wi));
   from.throughput = x.throughput * e.f * factor;
+  from.roulette = x.roulette;
   const double connection = x.previous_connects && !x.delta ? 1.0 : 0.0;
   from.others = (power_(backward) * x.others + connection) / power_(x.density);
   from.connects = !x.delta;
@@ -141,6 +144,7 @@ std::optional<Departure> SubpathTracer::trace(Walk walk, const Departure& start,
       const double survival = std::min(0.95, from.throughput.maxCoeff() / power);
       if (!(rng.uniform() < survival)) return std::nullopt;
       from.throughput /= survival;
+      from.roulette /= survival;
     }
     follower.leave(surface, next->wo);
   }

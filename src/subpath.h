@@ -49,6 +49,7 @@ struct SubpathVertex : Arrival {
   /// What multiplies the factors of the path from here on: of a subpath from the sensor radiance,
   /// of one from the light power.
   Rgbd throughput{0, 0, 0};
+  double roulette = 1;  ///< factor of the throughput that makes up for roulette
   bool delta = false;
 };
 
@@ -56,11 +57,12 @@ struct SubpathVertex : Arrival {
 struct Departure {
   Vec3d p{0, 0, 0};          ///< where it comes from
   Vec3d direction{0, 0, 0};  ///< unit
-  bool at_infinity = false;  ///< from the environment: p has no meaning
+  bool at_infinity = false;  ///< from an emitter at infinity: p has no meaning
   double cosine = 1;         ///< |n_g . omega| there; 1 at the sensor, at points and at infinity
   double density = 0;        ///< of the ray, per solid angle; from infinity per area across it
   Rgbd throughput{0, 0, 0};
-  double others = 0;  ///< of the next vertex, without its g^b
+  double roulette = 1;  ///< as of a vertex
+  double others = 0;    ///< of the next vertex, without its g^b
   bool connects = false;
 };
 

@@ -8,7 +8,8 @@
 
 namespace driftlight {
 
-/// Passes every event on to both. `depart`, which may change the ray, is for who derives from this.
+/// Passes every event on to both. Those that may change the walk, and where it is, are for who
+/// derives from this.
 template <Scalar T, class First, class Second>
 struct VisitorPair : WalkVisitor<T> {
   First first;
@@ -48,9 +49,41 @@ struct VisitorPair : WalkVisitor<T> {
     first.area_connection(emitter, cosine, r2);
     second.area_connection(emitter, cosine, r2);
   }
-  void point_connection(const PointEmitter& emitter, const T& r2) {
-    first.point_connection(emitter, r2);
-    second.point_connection(emitter, r2);
+  void point_connection(const Emitter& emitter, const Vec3<T>& wo, const T& r2) {
+    first.point_connection(emitter, wo, r2);
+    second.point_connection(emitter, wo, r2);
+  }
+  void directional_connection(const DirectionalEmitter& emitter) {
+    first.directional_connection(emitter);
+    second.directional_connection(emitter);
+  }
+  void area_emission(const AreaEmitter& emitter, const Vec3<T>& normal, const Vec3<T>& v) {
+    first.area_emission(emitter, normal, v);
+    second.area_emission(emitter, normal, v);
+  }
+  void point_emission(const Emitter& emitter, const Vec3<T>& v) {
+    first.point_emission(emitter, v);
+    second.point_emission(emitter, v);
+  }
+  void directional_emission(const DirectionalEmitter& emitter, const Vec3<T>& offset) {
+    first.directional_emission(emitter, offset);
+    second.directional_emission(emitter, offset);
+  }
+  void light_scatter(const ScatterEvent<T>& e) {
+    first.light_scatter(e);
+    second.light_scatter(e);
+  }
+  void light_delta(const ScatterEvent<T>& e) {
+    first.light_delta(e);
+    second.light_delta(e);
+  }
+  void light_connect(const ScatterEvent<T>& e) {
+    first.light_connect(e);
+    second.light_connect(e);
+  }
+  void joined(const T& r2) {
+    first.joined(r2);
+    second.joined(r2);
   }
 };
 

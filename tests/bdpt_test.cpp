@@ -302,6 +302,22 @@ TEST(LightTracing, HasTheShadingNormalsOfPathTracing) {
   expect_equal_means(builder.build(), 6, 100);
 }
 
+// Law: paths from the light, and no others, find light that comes from a point through smooth glass
+// onto a diffuse floor.
+TEST(Bdpt, FindsTheCausticOfAPoint) {
+  const LoadedScene loaded = load_small("point_caustic");
+  const int max_depth = loaded.max_depth.value();
+  Moments path, bdpt;
+  for (std::uint64_t run = 0; run < 12; ++run) {
+    RenderOptions render;
+    render.seed = run;
+    path.add(mean(render_path(loaded.scene, {max_depth}, render, 16).image));
+    bdpt.add(mean(render_bdpt(loaded.scene, {.max_depth = max_depth}, render, 16).image));
+  }
+  EXPECT_GT(bdpt.mean(), 1.03 * path.mean());
+  EXPECT_LT(welch_p_value(bdpt, path), 1e-3);
+}
+
 // Law: the sensor's clip planes cut connections to it as they cut its rays.
 TEST(LightTracing, ClipPlanesCutConnections) {
   const auto rendered = [](double near_clip, double far_clip) {
@@ -311,7 +327,7 @@ TEST(LightTracing, ClipPlanesCutConnections) {
     // A wall at depth 4, and a smaller screen before it at depth 2, lit from the sensor's side.
     builder.add_shape(quad({-3, -3, -4}, {6, 0, 0}, {0, 6, 0}), material);
     builder.add_shape(quad({-1, -1, -2}, {2, 0, 0}, {0, 2, 0}), material);
-    builder.add_emitter({{0.3, 0.2, 1.0}, Rgbd::Constant(10.0)});
+    builder.add_emitter(PointEmitter{{0.3, 0.2, 1.0}, Rgbd::Constant(10.0)});
     PerspectiveCamera camera = look_at({0, 0, 0}, {0, 0, -1}, 0.3);
     camera.near_clip = near_clip;
     camera.far_clip = far_clip;

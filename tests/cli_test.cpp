@@ -125,7 +125,11 @@ const std::vector<Mistake> kRenderMistakes{
     {{"scene.xml", "--threads", "-1"}, {"--threads", "'-1'", "from 0"}},
     {{"scene.xml", "--seed", "-1"}, {"--seed", "'-1'", "from 0"}},
     {{"scene.xml", "--seed", "0x10"}, {"--seed", "'0x10'"}},
-    {{"scene.xml", "--spp", "4"}, {"--spp", "path", "--mutations-per-pixel"}},
+    {{"scene.xml", "--set", "mode=chain", "--spp", "4"},
+     {"--spp", "redistribution", "--mutations-per-pixel"}},
+    {{"scene.xml", "--mutations-per-pixel", "4"},
+     {"--mutations-per-pixel", "mode=chain", "redistribution", "--spp"}},
+    {{"scene.xml", "--check-gradients"}, {"--check-gradients", "mode=chain"}},
     {{"scene.xml", "--integrator", "path", "--mutations-per-pixel", "4"},
      {"--mutations-per-pixel", "langevin", "--spp"}},
     {{"scene.xml", "--integrator", "bdpt", "--mutations-per-pixel", "4"},
@@ -241,11 +245,28 @@ TEST_F(Cli, DiffPrintsTheFigures) {
 // --- Renders -------------------------------------------------------------------------------------
 
 TEST_F(Cli, RendersIntoEveryFileThatWasAskedFor) {
-  const Outcome outcome =
-      run({"render", "scene.xml", "-o",         "a.exr",  "-o",
-           "a.png",  "-oa.pfm",   "--stats",    "s.json", "--mutations-per-pixel",
-           "20",     "--set",     "drift=full", "--set",  "direct=chain",
-           "-t",     "2",         "--seed",     "5",      "-v"});
+  const Outcome outcome = run({"render",
+                               "scene.xml",
+                               "-o",
+                               "a.exr",
+                               "-o",
+                               "a.png",
+                               "-oa.pfm",
+                               "--stats",
+                               "s.json",
+                               "--mutations-per-pixel",
+                               "20",
+                               "--set",
+                               "mode=chain",
+                               "--set",
+                               "drift=full",
+                               "--set",
+                               "direct=chain",
+                               "-t",
+                               "2",
+                               "--seed",
+                               "5",
+                               "-v"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(files(), (std::set<std::string>{"a.exr", "a.pfm", "a.png", "s.json", "scene.xml"}));
   const Image image = read_image(folder() / "a.exr");
@@ -309,8 +330,7 @@ TEST_F(Cli, TheSceneDepthIsLimitedWithANotice) {
   std::string deep = kScene;
   deep.replace(deep.find("value=\"4\""), 9, "value=\"40\"");
   write("deep.xml", deep);
-  const std::vector<std::string> arguments{"render", "deep.xml", "--mutations-per-pixel",
-                                           "1",      "--stats",  "s.json"};
+  const std::vector<std::string> arguments{"render", "deep.xml", "--spp", "1", "--stats", "s.json"};
   const Outcome outcome = run(arguments);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_NE(outcome.err.find("40 edges"), std::string::npos) << outcome.err;
@@ -324,7 +344,8 @@ TEST_F(Cli, TheSceneDepthIsLimitedWithANotice) {
 
 TEST_F(Cli, TheSameSeedGivesTheSameBytesOnAnyNumberOfThreads) {
   const std::vector<std::vector<std::string>> integrators{
-      {"--integrator", "langevin", "--mutations-per-pixel", "50"},
+      {"--integrator", "langevin", "--set", "mode=chain", "--mutations-per-pixel", "50"},
+      {"--integrator", "langevin", "--spp", "4"},
       {"--integrator", "path", "--spp", "4"},
       {"--integrator", "bdpt", "--spp", "4"},
       {"--integrator", "light", "--spp", "4"},

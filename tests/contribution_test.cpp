@@ -67,7 +67,7 @@ class OneBounce {
     builder.add_shape(quad({-4, -4, -4}, {8, 0, 0}, {0, 8, 0}), material);
     builder.add_shape(quad({-2, -2, 3}, {0, 4, 0}, {4, 0, 0}), black, kLampRadiance);
     builder.add_shape(quad({-4, -4, -8}, {8, 0, 0}, {0, 8, 0}), black, kBackRadiance);
-    builder.add_emitter({kBulb, kBulbIntensity});
+    builder.add_emitter(PointEmitter{kBulb, kBulbIntensity});
     builder.set_environment(ConstantEnvironment{kSky});
     PerspectiveCamera camera = look_at({0, 0, 0}, {0, 0, -1}, 0.6);
     camera.half_height = 0.4;
@@ -215,9 +215,12 @@ TEST(Contribution, SumOfLogarithmsEqualsTheProduct) {
     void area_connection(const AreaEmitter& emitter, const double& cosine, const double& r2) {
       f *= emitter.radiance * (cosine / r2);
     }
-    void point_connection(const PointEmitter& emitter, const double& r2) {
-      f *= emitter.intensity / r2;
+    void point_connection(const Emitter& emitter, const Vec3d& wo, const double& r2) {
+      const auto* spot = std::get_if<SpotEmitter>(&emitter);
+      f *= spot != nullptr ? Rgbd(spot->intensity() * spot->falloff(Vec3d(-wo)) / r2)
+                           : Rgbd(std::get<PointEmitter>(emitter).intensity / r2);
     }
+    void directional_connection(const DirectionalEmitter& emitter) { f *= emitter.irradiance; }
   };
   for (const TestScene& test : test_scenes()) {
     for (const PathSampler::Sample& path : light_paths(test, 500, 91)) {

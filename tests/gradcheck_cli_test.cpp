@@ -226,9 +226,10 @@ TEST_F(GradcheckCli, HelpSucceeds) {
 TEST_F(GradcheckCli, CheckingARenderLeavesItsImageAlone) {
   const auto render = [&](const std::string& name, const char* threads, bool check) {
     std::vector<std::string> arguments{
-        "render", "scene.xml",  "-o",      name + ".exr", "--mutations-per-pixel",
-        "20",     "--seed",     "3",       "-t",          threads,
-        "--set",  "drift=full", "--stats", name + ".json"};
+        "render",      "scene.xml", "-o",         name + ".exr", "--mutations-per-pixel",
+        "20",          "--set",     "mode=chain", "--seed",      "3",
+        "-t",          threads,     "--set",      "drift=full",  "--stats",
+        name + ".json"};
     if (check) arguments.emplace_back("--check-gradients");
     return run(arguments);
   };

@@ -155,7 +155,7 @@ Scene textured_wall() {
   texture.bitmap = pattern_bitmap(4, 4, 0.2, 0.9);
   const auto wall = builder.add_material({builder.add_bsdf(Diffuse{texture}), std::nullopt});
   builder.add_shape(quad({-1, -1, -2}, {2, 0, 0}, {0, 2, 0}, true), wall);
-  builder.add_emitter({{0.3, 0.4, 0.5}, {1, 2, 3}});
+  builder.add_emitter(PointEmitter{{0.3, 0.4, 0.5}, {1, 2, 3}});
   builder.set_camera(look_at({0, 0, 0}, {0, 0, -1}, 0.8));
   return builder.build();
 }

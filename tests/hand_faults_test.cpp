@@ -29,6 +29,7 @@ struct Fault {
   std::function<Vec3d(const PerspectiveCamera&, const Vec3d& v)> camera;
   std::function<Vec3d(const Vec3d& w, double r, const Vec3d& w_bar)> connection_adjoint;
   std::function<void(Vec3d&)> environment;
+  std::function<void(Vec3d&)> spot;
 };
 
 /// The rules with one fault.
@@ -79,6 +80,11 @@ struct FaultyRules : HandRules {
                            const Rgbd& shares) {
     Vec3d g = HandRules::environment(map, v, radiance, shares);
     if (fault->environment) fault->environment(g);
+    return g;
+  }
+  static Vec3d spot(const SpotEmitter& spot, const Vec3d& w) {
+    Vec3d g = HandRules::spot(spot, w);
+    if (fault->spot) fault->spot(g);
     return g;
   }
 };
@@ -218,7 +224,7 @@ std::vector<Fault> geometry_faults() {
 }
 
 std::vector<Fault> end_faults() {
-  std::vector<Fault> faults(5);
+  std::vector<Fault> faults(7);
   faults[0].name = "camera: power of the cosine";
   faults[0].camera = [](const PerspectiveCamera& camera, const Vec3d& v) {
     return Vec3d(2.0 / 3.0 * HandRules::camera(camera, v));
@@ -235,6 +241,10 @@ std::vector<Fault> end_faults() {
   faults[3].environment = [](Vec3d& g) { g.y() = -g.y(); };
   faults[4].name = "environment: factor of one component";
   faults[4].environment = [](Vec3d& g) { g.x() *= 1.01; };
+  faults[5].name = "spot: sign";
+  faults[5].spot = [](Vec3d& g) { g = -g; };
+  faults[6].name = "spot: factor";
+  faults[6].spot = [](Vec3d& g) { g *= 1.01; };
   return faults;
 }
 

@@ -56,7 +56,7 @@ class LayersCli : public ::testing::Test {
 };
 
 TEST_F(LayersCli, WritesNamedChannelsAndTheSameImage) {
-  const std::vector<std::string> work{"--mutations-per-pixel", "2", "--seed", "3"};
+  const std::vector<std::string> work{"--spp", "2", "--seed", "3"};
   std::vector<std::string> with{"-o", "with.exr", "--layers", "layers.exr"};
   with.insert(with.end(), work.begin(), work.end());
   std::vector<std::string> without{"-o", "without.exr"};

@@ -22,8 +22,8 @@ namespace {
 
 /// Length and end of a path in words.
 std::string kind(const PathTopology& topology) {
-  static const std::array<std::string, 4> ends{"hit", "environment", "area connection",
-                                               "point connection"};
+  static const std::array<std::string, 5> ends{"hit", "environment", "area connection",
+                                               "point connection", "directional connection"};
   const auto end = topology.vertices.begin() + topology.scatter_count;
   const bool delta =
       std::any_of(topology.vertices.begin(), end, [](const auto& v) { return v.delta; });
@@ -230,6 +230,7 @@ double connection_share(const PathSampler& uniform, const PathSampler& other, Fa
 /// End of a path, and for a hit the kind of shape.
 std::string end_kind(const Scene& scene, const PathTopology& topology) {
   if (topology.end == PathEnd::PointConnection) return "point";
+  if (topology.end == PathEnd::DirectionalConnection) return "directional";
   if (topology.end == PathEnd::Environment)
     return scene.emitters()[topology.emitter].index() == 2 ? "constant sky" : "map";
   const auto& light = std::get<AreaEmitter>(scene.emitters()[topology.emitter]);
@@ -276,10 +277,10 @@ TEST(PathSampler, StrategiesComeByTheirShare) {
   };
   for (const TestScene& test : test_scenes()) count_paths(test, 80000);
   count_paths(lamps(), 400000);
-  EXPECT_EQ(tallies.size(), 7U);
+  EXPECT_EQ(tallies.size(), 8U);
   const double significance = sidak(0.01, static_cast<int>(tallies.size()));
   for (const auto& [name, tally] : tallies) {
-    if (name == "point") {
+    if (name == "point" || name == "directional") {
       EXPECT_NEAR(tally.drawn, tally.expected, 1e-6 * tally.drawn);
       continue;
     }

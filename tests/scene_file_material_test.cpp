@@ -189,6 +189,49 @@ TEST(EmittersXml, ReadsPoints) {
   expect_near(second.intensity, Rgbd(1, 1, 1));
 }
 
+TEST(EmittersXml, ReadsSpots) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(with_sensor(
+      R"(<emitter type="spot"><transform name="toWorld">
+         <lookat origin="1, 2, 3" target="1, 0, 3" up="0, 0, 1"/></transform>
+         <rgb name="intensity" value="4, 5, 6"/><float name="cutoffAngle" value="30"/>
+         <float name="beamWidth" value="12"/><float name="samplingWeight" value="1"/></emitter>
+         <emitter type="spot"/>
+         <emitter type="spot"><float name="cutoffAngle" value="40"/></emitter>
+         <shape type="sphere"/>)"));
+  const auto& first = std::get<SpotEmitter>(loaded.scene.emitters()[0]);
+  expect_near(first.position(), Vec3d(1, 2, 3));
+  expect_near(first.axis(), Vec3d(0, -1, 0));
+  expect_near(first.intensity(), Rgbd(4, 5, 6));
+  EXPECT_NEAR(first.cutoff(), kPi / 6.0, 1e-12);
+  EXPECT_NEAR(first.beam_width(), kPi / 15.0, 1e-12);
+  const auto& second = std::get<SpotEmitter>(loaded.scene.emitters()[1]);
+  expect_near(second.position(), Vec3d(0, 0, 0));
+  expect_near(second.axis(), Vec3d(0, 0, 1));
+  expect_near(second.intensity(), Rgbd(1, 1, 1));
+  EXPECT_NEAR(second.cutoff(), kPi / 9.0, 1e-12);
+  EXPECT_NEAR(second.beam_width(), kPi / 12.0, 1e-12);
+  const auto& third = std::get<SpotEmitter>(loaded.scene.emitters()[2]);
+  EXPECT_NEAR(third.beam_width(), kPi / 6.0, 1e-12);
+}
+
+TEST(EmittersXml, ReadsDirectionals) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(with_sensor(
+      R"(<emitter type="directional"><vector name="direction" x="3" y="0" z="-4"/>
+         <spectrum name="irradiance" value="2"/></emitter>
+         <emitter type="directional"><transform name="toWorld"><rotate y="1" angle="90"/>
+         <scale value="3"/><translate x="7"/></transform></emitter>
+         <emitter type="directional"/><shape type="sphere"/>)"));
+  const auto& first = std::get<DirectionalEmitter>(loaded.scene.emitters()[0]);
+  expect_near(first.direction, Vec3d(0.6, 0, -0.8));
+  expect_near(first.irradiance, Rgbd(2, 2, 2));
+  const auto& second = std::get<DirectionalEmitter>(loaded.scene.emitters()[1]);
+  expect_near(second.direction, Vec3d(1, 0, 0));
+  expect_near(second.irradiance, Rgbd(1, 1, 1));
+  expect_near(std::get<DirectionalEmitter>(loaded.scene.emitters()[2]).direction, Vec3d(0, 0, 1));
+}
+
 TEST(EmittersXml, ReadsConstants) {
   const SceneDirectory directory;
   const LoadedScene loaded = directory.load(with_sensor(

@@ -142,6 +142,7 @@ struct Tally {
 TEST(StepLayers, HoldWhatEachSmallStepStartsFrom) {
   for (const TestScene& test : test_scenes()) {
     LangevinOptions options;
+    options.mode = Mode::Chain;
     options.large_step_probability = 0.3;
     const PathSampler sampler(test.scene, test.max_depth);
     Film film(4, 4);
@@ -172,6 +173,7 @@ TEST(StepLayers, HoldWhatEachSmallStepStartsFrom) {
 
 LangevinOptions small_options(const TestScene& test) {
   LangevinOptions options;
+  options.mode = Mode::Chain;
   options.max_depth = test.max_depth;
   options.bootstrap = 5000;
   options.chains = 16;

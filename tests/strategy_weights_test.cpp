@@ -26,7 +26,7 @@ struct GivenPath {
   const SurfaceHit& x(int k) const { return scattering[static_cast<std::size_t>(k - 1)]; }
   const Vec3d& direction(int k) const { return v[static_cast<std::size_t>(k)]; }
   bool delta(int k) const { return is_delta(*x(k).bsdf); }
-  bool infinite() const { return end.kind == LightEnd::Kind::Environment; }
+  bool infinite() const { return end.at_infinity(); }
   double inverse_r2(const Scene& scene, int k) const {  // of edge k
     if (k + 1 == length() && infinite()) return 1.0;
     const Vec3d from = k == 0 ? scene.camera().origin : x(k).at.p;
@@ -36,6 +36,7 @@ struct GivenPath {
   double end_cosine() const {
     return end.kind == LightEnd::Kind::Area ? -end.n.dot(v.back()) : 1.0;
   }
+  double falloff() const { return end.falloff(-v.back()); }
 };
 
 /// Cuts a subpath from the sensor and ends it at an emitter: one that was hit, the environment that
@@ -59,7 +60,7 @@ std::optional<GivenPath> draw_path(const TestScene& test, Rng& rng) {
       const SurfaceHit& x = path.scattering.back();
       path.end = sample_light_end(scene, rng);
       const LightEdge edge = edge_to(path.end, x.at.p);
-      if (is_delta(*x.bsdf) || !(edge.cosine > 0.0) || !passes(x.at, x.wi, edge.direction) ||
+      if (is_delta(*x.bsdf) || !edge.lit() || !passes(x.at, x.wi, edge.direction) ||
           !(scattered(x, x.wi, edge.direction).maxCoeff() > 0.0) ||
           !reaches(scene, path.end, x, edge))
         return std::nullopt;
@@ -94,7 +95,8 @@ std::vector<Departure> walk_from_sensor(const SubpathTracer& tracer, const Given
 /// Vertices x_(n-1), x_(n-2), .. as walked from the light.
 std::vector<SubpathVertex> walk_from_light(const SubpathTracer& tracer, const GivenPath& path) {
   std::vector<SubpathVertex> vertices;
-  const Emission emission{path.end.p, path.end.p, -path.v.back(), path.end_cosine()};
+  const Emission emission{path.end.p, path.end.p, -path.v.back(), path.end_cosine(),
+                          path.falloff()};
   Departure from = tracer.leave_light(path.end, emission);
   for (int k = path.length() - 1; k >= 1; --k) {
     SurfaceHit surface = path.x(k);
@@ -140,8 +142,9 @@ std::vector<double> weights_by_walking(const Scene& scene, const GivenPath& path
                                               : tracer.arrive(departures.back(), surface);
       w = weights.hit(arrival, t, path.end, path.end_cosine());
     } else if (t == n) {
-      w = weights.emitter(from_sensor(t - 1), path.end,
-                          {path.v.back(), path.inverse_r2(scene, n - 1), path.end_cosine()});
+      w = weights.emitter(
+          from_sensor(t - 1), path.end,
+          {path.v.back(), path.inverse_r2(scene, n - 1), path.end_cosine(), path.falloff()});
     } else if (t > 1) {
       w = weights.connection(from_sensor(t - 1), from_light(t), path.direction(t - 1),
                              path.inverse_r2(scene, t - 1));
@@ -192,7 +195,8 @@ Densities densities(const Scene& scene, const GivenPath& path) {
   p.sensor[1] = scene.camera().log_importance(path.direction(0)) + geometry(1, 0);
   p.light[index(n)] = std::log(path.end.density);
   p.light[index(n - 1)] =
-      std::log(emission_density(scene, path.end, path.end_cosine())) + geometry(n - 1, n - 1);
+      std::log(emission_density(scene, path.end, path.end_cosine(), path.falloff())) +
+      geometry(n - 1, n - 1);
   for (int k = 1; k < n; ++k) {
     const SurfaceHit& x = path.x(k);
     const Vec3d& wo = path.direction(k);
@@ -237,7 +241,7 @@ struct Coverage {
   int paths = 0;
   int hidden = 0;     ///< with a delta vertex
   int refracted = 0;  ///< through a smooth interface
-  int kinds[3] = {};  ///< by kind of the light end
+  int kinds[4] = {};  ///< by kind of the light end
 };
 
 void count(const GivenPath& path, Coverage& seen) {

@@ -50,6 +50,31 @@ class ConstraintVisitor : public WalkVisitor<T> {
     add(v, environment_precision(*map, stripped(v)));
   }
 
+  /// Spot: the direction against the covariance of its cone.
+  void point_connection(const Emitter& emitter, const Vec3<T>& wo, const T&) {
+    if (const auto* spot = std::get_if<SpotEmitter>(&emitter))
+      add(wo, constant<S>(1.0 / (spot->width() * spot->width())));
+  }
+
+  // From the light a vertex is what it is from the sensor with the two directions exchanged: then
+  // f_s |n.w_i| is the factor of a diffuse lobe, and slopes of half vectors are the same.
+  void light_scatter(const ScatterEvent<T>& e) {
+    scatter({e.bsdf, e.shape, e.at, e.wo, e.wi, e.scattering});
+  }
+  void light_connect(const ScatterEvent<T>& e) { light_scatter(e); }
+
+  /// Emission: tangential part of the direction; U = -log cos has sigma = cos.
+  void area_emission(const AreaEmitter&, const Vec3<T>& normal, const Vec3<T>& v) {
+    add_tangential(normal, v, constant<S>(1.0));
+  }
+  void point_emission(const Emitter& emitter, const Vec3<T>& v) {
+    point_connection(emitter, v, constant<T>(1.0));
+  }
+  /// Position on the disk, of standard deviation 1/2 along each axis.
+  void directional_emission(const DirectionalEmitter&, const Vec3<T>& offset) {
+    add(offset, constant<S>(4.0));
+  }
+
  private:
   static Vec3<S> stripped(const Vec3<T>& v) { return {strip(v.x()), strip(v.y()), strip(v.z())}; }
 
@@ -75,10 +100,13 @@ class ConstraintVisitor : public WalkVisitor<T> {
 
   /// Tangential part of wo; U = -log cos has sigma = cos.
   void add_diffuse(const ScatterEvent<T>& e, const S& responsibility) {
-    const T cosine = dot(e.at.n_s, e.wo);
-    const Vec3<T> minus_cosine = scaled(e.at.n_s, T(-cosine));
+    add_tangential(e.at.n_s, e.wo, responsibility);
+  }
+  void add_tangential(const Vec3<T>& n, const Vec3<T>& v, const S& responsibility) {
+    const T cosine = dot(n, v);
+    const Vec3<T> minus_cosine = scaled(n, T(-cosine));
     const S sigma = strip(cosine);
-    add(e.wo + minus_cosine, responsibility / (sigma * sigma));
+    add(v + minus_cosine, responsibility / (sigma * sigma));
   }
 
   void constrain(const Diffuse&, const ScatterEvent<T>& e) { add_diffuse(e, constant<S>(1.0)); }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Emitters: area lights, points, and environments at infinity.
+/// Emitters: area lights, points, spots, parallel light, and environments at infinity.
 #pragma once
 
 #include <cstdint>
@@ -21,6 +21,70 @@ struct AreaEmitter {
 struct PointEmitter {
   Vec3d position{0, 0, 0};
   Rgbd intensity{1, 1, 1};
+
+  /// Power / intensity, steradians.
+  double solid_angle() const { return 4.0 * kPi; }
+};
+
+/// A point that emits into a cone. At the angle theta to the axis its intensity is that on the
+/// axis, times
+///   falloff = 1                                  theta <= beam width
+///             (cutoff - theta) / (cutoff - beam)   up to the cutoff angle
+///             0                                  beyond (Mitsuba's spot).
+class SpotEmitter {
+ public:
+  /// Angles from the axis in radians, 0 <= beam_width <= cutoff and 0 < cutoff <= pi. The axis need
+  /// not be normalised.
+  SpotEmitter(const Vec3d& position, const Vec3d& axis, const Rgbd& intensity, double cutoff,
+              double beam_width);
+
+  const Vec3d& position() const { return position_; }
+  const Vec3d& axis() const { return axis_; }
+  const Rgbd& intensity() const { return intensity_; }
+  double cutoff() const { return cutoff_; }
+  double beam_width() const { return beam_width_; }
+
+  /// Along the unit direction v, away from the emitter.
+  template <Scalar T>
+  T falloff(const Vec3<T>& v) const {
+    using std::atan2;
+    using std::sqrt;
+    const double theta = angle(value(v));
+    if (theta <= beam_width_) return constant<T>(1.0);
+    if (theta >= cutoff_) return constant<T>(0.0);
+    const T cosine = dot(axis_, v);
+    const Vec3<T> off = v + scaled(constant<T>(axis_), T(-cosine));
+    return (cutoff_ - T(atan2(sqrt(dot(off, off)), cosine))) * inverse_transition_;
+  }
+  /// Gradient of `falloff` by v, normal to v; 0 where it is constant. With theta the angle,
+  ///   d theta / dv = (cos theta v - axis) / sin theta.
+  Vec3d falloff_gradient(const Vec3d& v) const;
+
+  /// Draws a direction in proportion to the falloff, whose density is falloff / solid_angle();
+  /// u1, u2 in [0, 1).
+  Vec3d sample(double u1, double u2) const;
+  /// Integral of the falloff over the sphere: power / intensity, steradians.
+  double solid_angle() const { return solid_angle_; }
+  /// Standard deviation of a direction in the cone, along one axis: that of a disk of radius
+  /// `cutoff`.
+  double width() const { return 0.5 * cutoff_; }
+
+ private:
+  double angle(const Vec3d& v) const;
+
+  Vec3d position_;
+  Vec3d axis_;
+  Rgbd intensity_;
+  double cutoff_;
+  double beam_width_;
+  double inverse_transition_;
+  double solid_angle_;
+};
+
+/// Parallel light from infinity. A surface that faces it receives `irradiance`.
+struct DirectionalEmitter {
+  Vec3d direction{0, 0, 1};  ///< in which the light travels; unit
+  Rgbd irradiance{1, 1, 1};
 };
 
 /// The same radiance from every direction.
@@ -82,11 +146,23 @@ class EnvironmentMap {
   double total_ = 0;
 };
 
-using Emitter = std::variant<AreaEmitter, PointEmitter, ConstantEnvironment, EnvironmentMap>;
+using Emitter = std::variant<AreaEmitter, PointEmitter, ConstantEnvironment, EnvironmentMap,
+                             SpotEmitter, DirectionalEmitter>;
 
 inline bool is_environment(const Emitter& emitter) {
   return std::holds_alternative<ConstantEnvironment>(emitter) ||
          std::holds_alternative<EnvironmentMap>(emitter);
+}
+
+/// A point or spot emitter.
+inline bool is_point(const Emitter& emitter) {
+  return std::holds_alternative<PointEmitter>(emitter) ||
+         std::holds_alternative<SpotEmitter>(emitter);
+}
+/// Where it is.
+inline const Vec3d& position_of(const Emitter& emitter) {
+  const auto* spot = std::get_if<SpotEmitter>(&emitter);
+  return spot != nullptr ? spot->position() : std::get<PointEmitter>(emitter).position;
 }
 
 }  // namespace driftlight

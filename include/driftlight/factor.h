@@ -7,7 +7,7 @@
 
 #include <variant>
 
-#include "driftlight/linearization.h"
+#include "driftlight/two_sided_factor.h"
 
 namespace driftlight {
 
@@ -56,11 +56,7 @@ class CholeskyFactor {
 /// every member costs O(length).
 class RiccatiFactor {
  public:
-  enum class Status : std::uint8_t {
-    Ok,
-    Indefinite,  ///< rounding left some Lambda without a root
-    NonFinite,   ///< some derivative was
-  };
+  using Status = FactorStatus;
 
   RiccatiFactor() = default;
   /// Unless `status` is Ok afterwards no other member may be used.
@@ -99,6 +95,10 @@ class RiccatiFactor {
   Status status_ = Status::Ok;
 };
 
-using Factor = std::variant<IdentityFactor, CholeskyFactor, RiccatiFactor>;
+using Factor = std::variant<IdentityFactor, CholeskyFactor, RiccatiFactor, TwoSidedFactor>;
+
+/// Sets `factor` to that of the constraints of a path: Riccati's, with a light side that of both
+/// sides. Unless the status is Ok it has no use.
+FactorStatus factorise(const Linearization& path, Factor& factor);
 
 }  // namespace driftlight

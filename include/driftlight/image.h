@@ -30,6 +30,9 @@ struct Image {
   }
 };
 
+/// Mean luminance of the pixels.
+double mean_luminance(const Image& image);
+
 /// Reads any format of OpenImageIO, the first three channels (one channel is repeated), as stored
 /// linear floats; 8- and 16-bit formats are taken as sRGB. Throws InputError.
 Image read_image(const std::filesystem::path& file);

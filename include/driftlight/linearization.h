@@ -12,6 +12,11 @@
 /// So every derivative is local, six columns wide, whatever the length of the path; the gradient
 /// is one adjoint sweep over the stages, and Q factorises by a Riccati recursion (factor.h). Work
 /// grows with the length, where dense Jacobians and Cholesky grow with its square and its cube.
+///
+/// With a light side there are two such systems: that of the sensor's side and that of the light
+/// side, which begins at the emitter and runs along the light. They meet in one last stage, the two
+/// ends of the joining edge, whose rows depend on the states of both: there x_(t-1) = A s, x_t = A'
+/// s' and all directions follow. The gradient is then an adjoint sweep along each side from there.
 #pragma once
 
 #include "driftlight/gradient.h"
@@ -20,28 +25,39 @@
 namespace driftlight {
 
 /// Columns of local derivatives: xi (2), omega (2), u (2), and two of padding to a full vector
-/// register.
+/// register. On the light side u (2), padding (2), xi (2), omega (2), so that in the last stage
+/// both states have their columns: xi and omega of the sensor's side, then of the light side.
 inline constexpr int kLocalWidth = 8;
 using LocalRow = Eigen::Array<double, 1, kLocalWidth>;
 
+/// First columns of the local variables of a side.
+struct LocalColumns {
+  int xi;
+  int omega;
+  int u;
+};
+inline constexpr LocalColumns kSensorColumns{.xi = 0, .omega = 2, .u = 4};
+inline constexpr LocalColumns kLightColumns{.xi = 4, .omega = 6, .u = 0};
+
 /// Most residuals of a path: two of the film, three of each position, six of each scattering (two
-/// lobes), three of the environment.
+/// lobes), three of the environment or of a spot.
 inline constexpr int kMaxResiduals = 2 + 9 * kMaxPathLength + 3;
 
 /// The sensor (stage 0), a scattering vertex, or the end of a path that hits an emitter or leaves
-/// the scene.
+/// the scene; of the light side the emitter (a point there, then emission) or a scattering vertex.
 struct Stage {
   enum class Kind : std::uint8_t {
     Free,      ///< takes a block of coordinates, and is followed by another stage
     Delta,     ///< no block of its own; followed by another stage
     Terminal,  ///< the last one, with a block (an emitter point) or without
+    Point,     ///< the first of a light side: its block is xi of the next
   };
   using Map = Eigen::Matrix<double, 2, 4, Eigen::RowMajor>;
 
   Kind kind = Kind::Terminal;
   bool has_block = false;
   int rows_end = 0;  ///< one past the last residual row of this stage; they follow each other
-  Map position;      ///< A; not set for stage 0 and terminal stages
+  Map position;      ///< A; not set for stage 0, points and terminal stages
   Map direction;     ///< D; delta stages only
 };
 
@@ -51,6 +67,8 @@ struct Linearization {
   Vector gradient;
   int stage_count = 0;  ///< 0 if constraints are not asked for
   int block_count = 0;
+  bool has_light_side = false;
+  int sensor_stages = 0;  ///< with a light side: those before it
   std::array<Stage, kMaxPathLength + 2> stages;
   /// Rows sqrt(w)/3 dr / d(xi, omega, u) of all residuals r with precision w, in the order of
   /// ConstraintVisitor.
@@ -82,7 +100,7 @@ Jacobian jacobian(const Linearization& path);
 /// Q = J^T J + floor, dense and symmetric. (d x d)
 Matrix constraint_matrix(const Linearization& path);
 
-/// Q x, in O(length). (d)
+/// Q x, in O(length) unless there is a light side. (d)
 Vector apply_constraints(const Linearization& path, const Vector& x);
 
 }  // namespace driftlight

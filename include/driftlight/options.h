@@ -61,9 +61,28 @@ enum class DirectLight {
   Apart,  ///< a path tracer, in a pass of its own
 };
 
+/// Who carries the light to the film.
+enum class Mode {
+  Chain,           ///< Markov chains, with normalization by independent samples
+  Redistribution,  ///< independent samples; chains spread those that are rare and heavy
+};
+
+/// Of Mode::Redistribution.
+struct RedistributionOptions {
+  /// tau: samples keep so many times the brightness of the image around them.
+  double threshold = 1;
+  /// Mutations of a chain.
+  int chain_length = 100;
+  /// Most mutations for each bidirectional sample, in the mean.
+  double mutations_per_sample = 4;
+};
+
 /// The Langevin sampler of [E63].
 struct LangevinOptions {
+  Mode mode = Mode::Redistribution;
   KernelOptions kernel;
+  RedistributionOptions redistribution;
+  PhaseSpace phase_space = PhaseSpace::Directions;
   double large_step_probability = 0.2;
   LargeSteps large_steps = LargeSteps::Bdpt;
   DirectLight direct = DirectLight::Apart;
@@ -108,6 +127,9 @@ struct LightOptions {
   /// Throws OptionError.
   void validate() const;
 };
+
+/// As options name it.
+std::string_view name_of(PhaseSpace phase_space);
 
 /// One option by name, bound to a field.
 struct OptionEntry {

@@ -26,9 +26,10 @@ class PathSampler {
  public:
   /// The strategies are, of LargeSteps::Path, those with s <= 1, but not the connection of the
   /// sensor itself, equally likely; of LargeSteps::Bdpt all, those with s <= 1 making half of the
-  /// attempts at least. Lengths from min_depth to max_depth edges.
+  /// attempts at least. Lengths from min_depth to max_depth edges. Paths have coordinates of
+  /// `phase_space`; those without are not drawn.
   PathSampler(const Scene& scene, int max_depth, LargeSteps large_steps = LargeSteps::Path,
-              int min_depth = 1);
+              int min_depth = 1, PhaseSpace phase_space = PhaseSpace::Directions);
 
   struct Sample {
     PathTopology topology;
@@ -60,6 +61,7 @@ class PathSampler {
   std::vector<double> spread(double probability) const;
 
   const Scene& scene_;
+  PhaseSpace phase_space_;
   std::vector<Strategy> strategies_;
   std::vector<int> first_of_length_;  ///< entry of (n, 0), by n; one past the end at last
   DiscreteDistribution table_;

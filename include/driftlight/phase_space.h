@@ -23,10 +23,13 @@ enum class TraceStatus : std::uint8_t {
   Occluded,   ///< the connection, or the way to the environment, is blocked
 };
 
+/// True if points on an area emitter of this shape can be coordinates: planar ones and spheres.
+bool has_points(const Shape& emitter);
+
 /// True if a path whose last scattering vertex has this BSDF reaches the area emitter through a
 /// connection; else its last direction is free to hit it. A function of the lobe and the emitter
 /// only, so that each path has exactly one chart: diffuse lobes, which care little about direction,
-/// connect; and only to emitters with a chart of their own (planar ones and spheres).
+/// connect; and only to emitters that have points.
 bool connects_to_area(const Bsdf& last, const Shape& emitter);
 
 /// Radiance may pass from wo to wi: both lie on the same side of the geometric and of the shading

@@ -72,12 +72,17 @@ struct LangevinStatistics {
   /// Mutations spent at paths of n edges.
   std::array<std::uint64_t, kMaxPathLength + 1> path_length{};
   std::uint64_t mutations = 0;
-  double b = 0;        ///< normalization: mean luminance of the image by the chains
-  double b_error = 0;  ///< its standard error
+  /// Normalization: mean luminance of the image by the chains; in Mode::Redistribution of it all.
+  double b = 0;
+  double b_error = 0;  ///< its standard error; in Mode::Redistribution it is not known
   /// Of paths of one and two edges, if they are rendered apart.
   double direct_mean = 0;  ///< mean luminance
   double direct_samples_per_pixel = 0;
   double direct_seconds = 0;  ///< part of render_seconds
+  /// Of Mode::Redistribution: mean luminance that chains carry, and how many samples started any.
+  double remainder = 0;
+  std::uint64_t starts = 0;
+  double samples_per_pixel = 0;
   double bootstrap_seconds = 0;
   double render_seconds = 0;
   bool stopped = false;
@@ -92,10 +97,11 @@ struct LangevinResult {
 };
 
 /// Renders with the Langevin sampler ([E63]; large steps and normalization as DESIGN 1.8).
-/// `mutations_per_pixel` is the work if no time is given.
+/// `work` is the work if no time is given: mutations per pixel, in Mode::Redistribution samples per
+/// pixel, at least one.
 /// Throws OptionError, and InputError if no path of the scene carries light to the sensor.
 LangevinResult render_langevin(const Scene& scene, const LangevinOptions& options,
-                               const RenderOptions& render, double mutations_per_pixel);
+                               const RenderOptions& render, double work);
 
 /// Of an integrator whose samples are independent.
 struct PathResult {

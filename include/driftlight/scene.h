@@ -47,7 +47,7 @@ struct Shape {
 /// A point drawn on an emitter, for a connection.
 struct EmitterPoint {
   Vec3d p = Vec3d::Zero();
-  Vec3d n = Vec3d::Zero();  ///< unit normal on the emitting side; zero for point emitters
+  Vec3d n = Vec3d::Zero();  ///< unit normal on the emitting side; zero for points and spots
 };
 
 class Scene {
@@ -135,6 +135,8 @@ class SceneBuilder {
   std::uint32_t add_shape(Geometry geometry, std::uint32_t material,
                           std::optional<Rgbd> radiance = std::nullopt);
   void add_emitter(PointEmitter emitter);
+  void add_emitter(SpotEmitter emitter);
+  void add_emitter(DirectionalEmitter emitter);
   /// A ConstantEnvironment or EnvironmentMap. Throws InputError on a second one.
   void set_environment(Emitter environment);
   void set_camera(const PerspectiveCamera& camera);

@@ -18,6 +18,8 @@ struct SceneCheckOptions {
   std::uint64_t seed = 0;
   /// Longest path, in edges.
   int max_depth = LangevinOptions{}.max_depth;
+  /// Of the coordinates by which the derivatives are.
+  PhaseSpace phase_space = LangevinOptions{}.phase_space;
   /// Threads of the machine; 0: all. The result does not depend on it.
   int threads = 0;
   /// Called now and then, from one thread at a time.
@@ -40,9 +42,9 @@ struct SceneCheck {
 SceneCheck check_scene(const Scene& scene, const SceneCheckOptions& options,
                        const DerivativeFunctions& functions = DerivativeFunctions());
 
-/// Path `index` of `seed`: a function of the scene, max_depth, the seed and the index alone. None
-/// if no light is found.
+/// Path `index` of `seed`: a function of the other arguments alone. None if no light is found.
 std::optional<PathSampler::Sample> draw_light_path(const Scene& scene, int max_depth,
-                                                   std::uint64_t seed, std::uint64_t index);
+                                                   std::uint64_t seed, std::uint64_t index,
+                                                   PhaseSpace phase_space = {});
 
 }  // namespace driftlight

@@ -44,7 +44,31 @@ struct WalkVisitor {
   void hit(const AreaEmitter&, const T& /*cosine*/, const T& /*r2*/) {}
   void environment(const Emitter&, const Vec3<T>& /*v*/) {}
   void area_connection(const AreaEmitter&, const T& /*cosine*/, const T& /*r2*/) {}
-  void point_connection(const PointEmitter&, const T& /*r2*/) {}
+  /// A point or spot emitter; `wo` is the unit direction toward it.
+  void point_connection(const Emitter&, const Vec3<T>& /*wo*/, const T& /*r2*/) {}
+  void directional_connection(const DirectionalEmitter&) {}
+
+  // Of paths with a light side, whose walk is: the sensor's side up to the vertex before the last,
+  // the light side likewise, and then the two last vertices with the edge that joins them.
+
+  /// The light side begins.
+  void light_side() {}
+  /// A point that light leaves from, for a visitor that changes its derivatives (never its value).
+  void leave_point(Vec3<T>& /*y*/) {}
+  /// Emission along v, `normal` that of the emitter at y.
+  void area_emission(const AreaEmitter&, const Vec3<T>& /*normal*/, const Vec3<T>& /*v*/) {}
+  void point_emission(const Emitter&, const Vec3<T>& /*v*/) {}
+  /// `offset` from the centre of the disk across the light, in units of its radius.
+  void directional_emission(const DirectionalEmitter&, const Vec3<T>& /*offset*/) {}
+  /// Scattering on the light side; wi is toward the sensor, as everywhere.
+  void light_scatter(const ScatterEvent<T>&) {}
+  void light_delta(const ScatterEvent<T>&) {}
+  /// Scattering from the light into the joining edge.
+  void light_connect(const ScatterEvent<T>&) {}
+  /// The joining edge has this squared length.
+  void joined(const T& /*r2*/) {}
+  /// The events to come are at vertex k, 0 is x_1.
+  void vertex(int /*k*/) {}
 };
 
 /// Outward normal of an emitter that can be connected to, at the point y on its surface.
@@ -60,11 +84,171 @@ Vec3<T> emitter_normal(const Shape& shape, const Vec3<T>& y) {
   return constant<T>(geometric_normal(std::get<TriangleMesh>(shape.geometry), 0));
 }
 
+/// A vertex that a ray has come to: w points back along the ray.
+template <Scalar T>
+struct WalkVertex {
+  const PathVertex& vertex;
+  const Shape& shape;
+  Interaction<T> at;
+  Vec3<T> w;
+  const Bsdf& bsdf;
+
+  SurfacePoint<T> surface() const { return {at.n_s, at.uv}; }
+  /// The event with the two directions in the order of the path.
+  ScatterEvent<T> event(const Vec3<T>& wi, const Vec3<T>& wo) const {
+    return {bsdf, shape, at, wi, wo, vertex.scattering};
+  }
+};
+
+template <Scalar T>
+WalkVertex<T> arrive(const Scene& scene, const PathVertex& vertex, const Ray<T>& ray) {
+  const Shape& shape = scene.shapes()[vertex.hit.shape];
+  Interaction<T> at = scene.interact(vertex.hit, ray);
+  const Vec3<T> w = -ray.direction;
+  // A displaced path may see a black back side: its front evaluates to zero there.
+  const Bsdf* acting = scene.bsdf_at(vertex.hit, w, at);
+  const Bsdf& bsdf =
+      acting != nullptr ? *acting : scene.bsdfs()[scene.materials()[shape.material].front];
+  return {vertex, shape, at, w, bsdf};
+}
+
+/// The walk along a path with a light side.
+template <Scalar T, class Blocks, class Visitor>
+class TwoSidedWalk {
+ public:
+  TwoSidedWalk(const Scene& scene, const PathTopology& topology, const Blocks& blocks,
+               Visitor& visitor)
+      : scene_(scene), topology_(topology), blocks_(blocks), visitor_(visitor) {}
+
+  void run() {
+    if (topology_.camera_count() == 0) {
+      const WalkVertex<T> y = light_side();
+      return join(scene_.camera(), y);
+    }
+    const WalkVertex<T> x = camera_side();
+    const WalkVertex<T> y = light_side();
+    join(x, y);
+  }
+
+ private:
+  const PathVertex& vertex(int k) const { return topology_.vertices[static_cast<std::size_t>(k)]; }
+
+  WalkVertex<T> camera_side() {
+    const PerspectiveCamera& camera = scene_.camera();
+    Ray<T> ray{constant<T>(camera.origin), blocks_(next_block_++)};
+    visitor_.sensor(camera, ray.direction);
+    visitor_.depart(ray, constant<T>(camera.forward));
+    const int last = topology_.camera_count() - 1;
+    for (int k = 0; k < last; ++k) {
+      const WalkVertex<T> x = arrive(scene_, vertex(k), ray);
+      visitor_.vertex(k);
+      visitor_.position(x.shape, x.at.p);
+      leave(x, ray);
+      if (x.vertex.delta)
+        visitor_.delta(x.event(x.w, ray.direction));
+      else
+        visitor_.scatter(x.event(x.w, ray.direction));
+      visitor_.depart(ray, x.at.n_g);
+    }
+    return arrive(scene_, vertex(last), ray);
+  }
+
+  WalkVertex<T> light_side() {
+    visitor_.light_side();
+    Ray<T> ray = emit();
+    const int last = topology_.camera_count();
+    for (int k = topology_.scatter_count - 1; k > last; --k) {
+      const WalkVertex<T> x = arrive(scene_, vertex(k), ray);
+      visitor_.vertex(k);
+      visitor_.position(x.shape, x.at.p);
+      leave(x, ray);
+      if (x.vertex.delta)
+        visitor_.light_delta(x.event(ray.direction, x.w));
+      else
+        visitor_.light_scatter(x.event(ray.direction, x.w));
+      visitor_.depart(ray, x.at.n_g);
+    }
+    return arrive(scene_, vertex(last), ray);
+  }
+
+  /// The emitted ray.
+  Ray<T> emit() {
+    const Emitter& emitter = scene_.emitters()[topology_.emitter];
+    if (topology_.end == PathEnd::PointEmission) {
+      Ray<T> ray{constant<T>(position_of(emitter)), blocks_(next_block_++)};
+      visitor_.point_emission(emitter, ray.direction);
+      visitor_.depart(ray, ray.direction);
+      return ray;
+    }
+    Vec3<T> y = blocks_(next_block_++);
+    if (const auto* parallel = std::get_if<DirectionalEmitter>(&emitter)) {
+      const Vec3d center = scene_.center() - scene_.radius() * parallel->direction;
+      visitor_.directional_emission(
+          *parallel, scaled(Vec3<T>(y - constant<T>(center)), constant<T>(1.0 / scene_.radius())));
+      visitor_.leave_point(y);
+      return {y, constant<T>(parallel->direction)};
+    }
+    const auto& light = std::get<AreaEmitter>(emitter);
+    const Shape& shape = scene_.shapes()[light.shape];
+    visitor_.position(shape, y);
+    visitor_.leave_point(y);
+    const Vec3<T> normal = emitter_normal(shape, y);
+    Ray<T> ray{y, blocks_(next_block_++)};
+    visitor_.area_emission(light, normal, ray.direction);
+    visitor_.depart(ray, normal);
+    return ray;
+  }
+
+  /// The ray that leaves x on its side of the path.
+  void leave(const WalkVertex<T>& x, Ray<T>& ray) {
+    ray.origin = x.at.p;
+    ray.direction = x.vertex.delta ? delta_direction(x.bsdf, x.surface(), x.w, x.vertex.scattering)
+                                   : blocks_(next_block_++);
+  }
+
+  void join(const WalkVertex<T>& x, const WalkVertex<T>& y) {
+    const T r2 = aim(x.at.p, y.at.p);
+    visitor_.vertex(topology_.camera_count() - 1);
+    visitor_.position(x.shape, x.at.p);
+    visitor_.connect(x.event(x.w, edge_));
+    join_light(y, r2);
+  }
+  void join(const PerspectiveCamera& camera, const WalkVertex<T>& y) {
+    const T r2 = aim(constant<T>(camera.origin), y.at.p);
+    visitor_.sensor(camera, edge_);
+    join_light(y, r2);
+  }
+  /// Sets the unit direction of the joining edge; its squared length.
+  T aim(const Vec3<T>& from, const Vec3<T>& to) {
+    using std::sqrt;
+    const Vec3<T> edge = to - from;
+    const T r2 = dot(edge, edge);
+    edge_ = scaled(edge, constant<T>(1.0) / sqrt(r2));
+    return r2;
+  }
+  void join_light(const WalkVertex<T>& y, const T& r2) {
+    visitor_.vertex(topology_.camera_count());
+    visitor_.position(y.shape, y.at.p);
+    const Vec3<T> wi = -edge_;
+    visitor_.light_connect(y.event(wi, y.w));
+    visitor_.joined(r2);
+  }
+
+  const Scene& scene_;
+  const PathTopology& topology_;
+  const Blocks& blocks_;
+  Visitor& visitor_;
+  Vec3<T> edge_;
+  int next_block_ = 0;
+};
+
 /// Walks the path. `blocks(k)` gives block k as Vec3<T> (see PathCoordinates); each is asked for
 /// once, in order.
 template <Scalar T, class Blocks, class Visitor>
 void walk(const Scene& scene, const PathTopology& topology, const Blocks& blocks,
           Visitor& visitor) {
+  if (topology.has_light_side())
+    return TwoSidedWalk<T, Blocks, Visitor>(scene, topology, blocks, visitor).run();
   using std::sqrt;
   const PerspectiveCamera& camera = scene.camera();
   Ray<T> ray{constant<T>(camera.origin), blocks(0)};
@@ -72,44 +256,44 @@ void walk(const Scene& scene, const PathTopology& topology, const Blocks& blocks
   visitor.depart(ray, constant<T>(camera.forward));
   int next_block = 1;
   for (int k = 0; k < topology.scatter_count; ++k) {
-    const PathVertex& vertex = topology.vertices[static_cast<std::size_t>(k)];
-    const Shape& shape = scene.shapes()[vertex.hit.shape];
-    Interaction<T> at = scene.interact(vertex.hit, ray);
-    const Vec3<T> wi = -ray.direction;
-    // A displaced path may see a black back side: its front evaluates to zero there.
-    const Bsdf* acting = scene.bsdf_at(vertex.hit, wi, at);
-    const Bsdf& bsdf =
-        acting != nullptr ? *acting : scene.bsdfs()[scene.materials()[shape.material].front];
-    visitor.position(shape, at.p);
+    const WalkVertex<T> x = arrive(scene, topology.vertices[static_cast<std::size_t>(k)], ray);
+    const Interaction<T>& at = x.at;
+    const Vec3<T>& wi = x.w;
+    visitor.vertex(k);
+    visitor.position(x.shape, at.p);
     const bool connects = topology.ends_in_connection() && k + 1 == topology.scatter_count;
     if (!connects) {
       ray.origin = at.p;
-      if (vertex.delta) {
-        ray.direction =
-            delta_direction(bsdf, SurfacePoint<T>{at.n_s, at.uv}, wi, vertex.scattering);
-        visitor.delta({bsdf, shape, at, wi, ray.direction, vertex.scattering});
+      if (x.vertex.delta) {
+        ray.direction = delta_direction(x.bsdf, x.surface(), wi, x.vertex.scattering);
+        visitor.delta(x.event(wi, ray.direction));
       } else {
         ray.direction = blocks(next_block++);
-        visitor.scatter({bsdf, shape, at, wi, ray.direction, vertex.scattering});
+        visitor.scatter(x.event(wi, ray.direction));
       }
       visitor.depart(ray, at.n_g);
       continue;
     }
     const Emitter& emitter = scene.emitters()[topology.emitter];
+    if (const auto* parallel = std::get_if<DirectionalEmitter>(&emitter)) {
+      const Vec3<T> wo = constant<T>(Vec3d(-parallel->direction));
+      visitor.connect(x.event(wi, wo));
+      visitor.directional_connection(*parallel);
+      return;
+    }
     const bool area = topology.end == PathEnd::AreaConnection;
-    const Vec3<T> y =
-        area ? Vec3<T>(blocks(next_block)) : constant<T>(std::get<PointEmitter>(emitter).position);
+    const Vec3<T> y = area ? Vec3<T>(blocks(next_block)) : constant<T>(position_of(emitter));
     const Vec3<T> edge = y - at.p;
     const T r2 = dot(edge, edge);
     const Vec3<T> wo = scaled(edge, constant<T>(1.0) / sqrt(r2));
-    visitor.connect({bsdf, shape, at, wi, wo, vertex.scattering});
+    visitor.connect(x.event(wi, wo));
     if (area) {
       const auto& light = std::get<AreaEmitter>(emitter);
       const Shape& light_shape = scene.shapes()[light.shape];
       visitor.position(light_shape, y);
       visitor.area_connection(light, -dot(emitter_normal(light_shape, y), wo), r2);
     } else {
-      visitor.point_connection(std::get<PointEmitter>(emitter), r2);
+      visitor.point_connection(emitter, wo, r2);
     }
     return;
   }

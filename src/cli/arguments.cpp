@@ -67,6 +67,7 @@ struct Raw {
   bool check_gradients = false;
   std::string paths = "20000";
   std::string max_depth;
+  std::string phase_space;
   std::string json_file;
   std::optional<std::string> replay;
   bool verbose = false;
@@ -98,10 +99,10 @@ void declare_render(CLI::App& app, Raw& raw) {
       ->type_name("OPTION=VALUE");
   app.add_option("--time", raw.time, "render for this long")->type_name("SECONDS");
   app.add_option("--mutations-per-pixel", raw.mutations_per_pixel,
-                 "work of the langevin integrator (default: 100)")
+                 "work of the langevin integrator with mode=chain (default: 100)")
       ->type_name("N");
   app.add_option("--spp", raw.samples_per_pixel,
-                 "work of the path, bdpt and light integrators, samples per pixel (default: 64)")
+                 "work of all others, samples per pixel (default: 64)")
       ->type_name("N");
   app.add_option("-t,--threads", raw.threads, "threads; 0: all")
       ->type_name("N")
@@ -131,6 +132,9 @@ void declare_gradcheck(CLI::App& app, Raw& raw) {
   app.add_option("--paths", raw.paths, "paths to check")->type_name("N")->capture_default_str();
   app.add_option("--max-depth", raw.max_depth, "longest path, in edges (default: as render)")
       ->type_name("N");
+  app.add_option("--phase-space", raw.phase_space,
+                 "coordinates of a path: directions or bidirectional (default: as render)")
+      ->type_name("SPACE");
   app.add_option("-t,--threads", raw.threads, "threads; 0: all")
       ->type_name("N")
       ->capture_default_str();
@@ -166,14 +170,11 @@ SceneArguments scene_arguments(const Raw& raw) {
   return scene;
 }
 
-/// At most one of the three, and the one that the integrator has.
+/// At most one of the three, and one that the integrator has.
 void set_work(const Raw& raw, RenderCommand& command) {
   const int given =
       (raw.time ? 1 : 0) + (raw.mutations_per_pixel ? 1 : 0) + (raw.samples_per_pixel ? 1 : 0);
   if (given > 1) throw UsageError("give only one of --time, --mutations-per-pixel and --spp");
-  if (raw.samples_per_pixel && command.integrator == Integrator::Langevin)
-    throw UsageError(
-        "--spp is for the path, bdpt and light integrators; langevin takes --mutations-per-pixel");
   if (raw.mutations_per_pixel && command.integrator != Integrator::Langevin)
     throw UsageError(fmt::format(
         "--mutations-per-pixel is for the langevin integrator; {} takes --spp", raw.integrator));
@@ -244,6 +245,11 @@ GradcheckCommand gradcheck_command(const Raw& raw) {
     if (*command.max_depth > kMaxPathLength)
       throw UsageError(fmt::format("--max-depth is '{}': must be an integer from 1 to {}",
                                    raw.max_depth, kMaxPathLength));
+  }
+  if (!raw.phase_space.empty()) {
+    LangevinOptions options;
+    set_option(entries(options), "phase_space", raw.phase_space);
+    command.phase_space = options.phase_space;
   }
   if (!raw.json_file.empty()) command.json = raw.json_file;
   if (raw.replay) command.replay = parse_number("--replay", *raw.replay, std::uint64_t{0});

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "driftlight/error.h"
+#include "driftlight/options.h"
 
 namespace driftlight::cli {
 
@@ -37,8 +38,8 @@ struct RenderCommand {
   Integrator integrator = Integrator::Langevin;
   std::vector<std::pair<std::string, std::string>> settings;
   std::optional<double> time;
-  double mutations_per_pixel = 100;
-  int samples_per_pixel = 64;
+  std::optional<double> mutations_per_pixel;
+  std::optional<int> samples_per_pixel;
   int threads = 0;
   std::uint64_t seed = 0;
   std::optional<std::filesystem::path> statistics;
@@ -54,6 +55,7 @@ struct GradcheckCommand {
   int paths = 20000;
   std::uint64_t seed = 0;
   std::optional<int> max_depth;
+  PhaseSpace phase_space = LangevinOptions{}.phase_space;
   int threads = 0;
   std::optional<std::filesystem::path> json;
   std::optional<std::uint64_t> replay;  ///< index of one path, instead of all

@@ -34,12 +34,14 @@ std::string replay_line(const GradcheckCommand& command, std::uint64_t index) {
   for (const auto& [name, value] : command.scene.defines)
     line += fmt::format(" -D {}", quoted(fmt::format("{}={}", name, value)));
   if (command.max_depth) line += fmt::format(" --max-depth {}", *command.max_depth);
+  if (command.phase_space != LangevinOptions{}.phase_space)
+    line += fmt::format(" --phase-space {}", name_of(command.phase_space));
   return line + fmt::format(" --seed {} --replay {}", command.seed, index);
 }
 
 void replay(const GradcheckCommand& command, const Scene& scene, int depth) {
   const std::uint64_t index = *command.replay;
-  const auto path = draw_light_path(scene, depth, command.seed, index);
+  const auto path = draw_light_path(scene, depth, command.seed, index, command.phase_space);
   if (!path)
     throw InputError(fmt::format("there is no path {} of seed {}: no sample of it carries light",
                                  index, command.seed));
@@ -55,6 +57,7 @@ nlohmann::ordered_json json_of(const GradcheckCommand& command, const SceneCheck
                               {"scene", command.scene.file.string()},
                               {"seed", command.seed},
                               {"max_depth", depth},
+                              {"phase_space", name_of(command.phase_space)},
                               {"not_found", check.not_found},
                               {"not_reached", check.not_reached},
                               {"seconds", seconds}};
@@ -67,6 +70,7 @@ void check(const GradcheckCommand& command, const Scene& scene, int depth) {
   options.paths = command.paths;
   options.seed = command.seed;
   options.max_depth = depth;
+  options.phase_space = command.phase_space;
   options.threads = command.threads;
   const Stopwatch watch;
   const SceneCheck check = [&] {

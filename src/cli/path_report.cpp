@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -39,11 +40,22 @@ class Describer : public WalkVisitor<double> {
   Describer(const Scene& scene, const PathTopology& topology)
       : scene_(scene), topology_(topology) {}
 
-  const std::string& text() const { return text_; }
+  std::string text() const {
+    std::string text;
+    for (std::size_t k = 0; k < topology_.scatter_count; ++k) text += vertices_.at(k);
+    return text + end_;
+  }
 
   void scatter(const ScatterEvent<double>& e) { add(e); }
   void connect(const ScatterEvent<double>& e) { add(e); }
   void delta(const ScatterEvent<double>& e) { add(e); }
+  void vertex(int k) { index_ = static_cast<std::size_t>(k); }
+  void light_scatter(const ScatterEvent<double>& e) { add(e); }
+  void light_delta(const ScatterEvent<double>& e) { add(e); }
+  void light_connect(const ScatterEvent<double>& e) { add(e); }
+  void light_side() {
+    end(fmt::format("emits; the last {} vertices are the light side", topology_.light_count));
+  }
   void hit(const AreaEmitter&, const double&, const double&) {
     const Hit& at = topology_.vertices[topology_.scatter_count].hit;
     end(fmt::format("hits {}, primitive {}", shape_text(at.shape), at.primitive));
@@ -52,36 +64,39 @@ class Describer : public WalkVisitor<double> {
   void area_connection(const AreaEmitter& light, const double&, const double&) {
     end("connects to a point on " + shape_text(light.shape));
   }
-  void point_connection(const PointEmitter&, const double&) { end("connects to the point"); }
+  void point_connection(const Emitter&, const Vec3d&, const double&) {
+    end("connects to the point");
+  }
+  void directional_connection(const DirectionalEmitter&) { end("leaves toward the light"); }
 
  private:
   std::string shape_text(std::uint32_t shape) const {
     return fmt::format("shape {} ({})", shape, kind_of(scene_.shapes()[shape]));
   }
   void add(const ScatterEvent<double>& e) {
-    const Hit& at = topology_.vertices[count_++].hit;
-    text_ += fmt::format("  {:>2}  {}, primitive {}: {} (bsdf {}), {}, at {}\n", count_,
-                         shape_text(at.shape), at.primitive, kind_of(e.bsdf),
-                         &e.bsdf - scene_.bsdfs().data(),
-                         e.scattering == Scattering::Reflection ? "reflection" : "transmission",
-                         vector_text(e.at.p));
+    const Hit& at = topology_.vertices[index_].hit;
+    vertices_.at(index_) = fmt::format(
+        "  {:>2}  {}, primitive {}: {} (bsdf {}), {}, at {}\n", index_ + 1, shape_text(at.shape),
+        at.primitive, kind_of(e.bsdf), &e.bsdf - scene_.bsdfs().data(),
+        e.scattering == Scattering::Reflection ? "reflection" : "transmission",
+        vector_text(e.at.p));
   }
   void end(const std::string& how) {
-    text_ += fmt::format("  end {}: emitter {} ({})\n", how, topology_.emitter,
-                         kind_of(scene_.emitters()[topology_.emitter]));
+    end_ = fmt::format("  end {}: emitter {} ({})\n", how, topology_.emitter,
+                       kind_of(scene_.emitters()[topology_.emitter]));
   }
 
   const Scene& scene_;
   const PathTopology& topology_;
-  std::size_t count_ = 0;
-  std::string text_;
+  std::size_t index_ = 0;
+  std::array<std::string, kMaxPathLength> vertices_;
+  std::string end_;
 };
 
 std::string coordinates_text(const PathSampler::Sample& path) {
   std::string text = "coordinates\n";
   for (int k = 0; k < path.topology.block_count; ++k) {
-    const bool point =
-        path.topology.end == PathEnd::AreaConnection && k + 1 == path.topology.block_count;
+    const bool point = k == path.topology.point_block();
     text += fmt::format("  {:>2}  {:<9} {}\n", k, point ? "point" : "direction",
                         vector_text(path.coordinates(k)));
   }

@@ -29,34 +29,46 @@ struct Rendered {
   Report report;
 };
 
+constexpr double kMutationsPerPixel = 100;
+constexpr int kSamplesPerPixel = 64;
+
+int samples_per_pixel(const RenderCommand& command) {
+  return command.samples_per_pixel.value_or(kSamplesPerPixel);
+}
+
 LangevinResult render_with(const Scene& scene, const LangevinOptions& options,
                            const RenderOptions& render, const RenderCommand& command) {
-  return render_langevin(scene, options, render, command.mutations_per_pixel);
+  const double work = options.mode == Mode::Chain
+                          ? command.mutations_per_pixel.value_or(kMutationsPerPixel)
+                          : static_cast<double>(samples_per_pixel(command));
+  return render_langevin(scene, options, render, work);
 }
 
 PathResult render_with(const Scene& scene, const PathOptions& options, const RenderOptions& render,
                        const RenderCommand& command) {
-  return render_path(scene, options, render, command.samples_per_pixel);
+  return render_path(scene, options, render, samples_per_pixel(command));
 }
 
 PathResult render_with(const Scene& scene, const BdptOptions& options, const RenderOptions& render,
                        const RenderCommand& command) {
-  return render_bdpt(scene, options, render, command.samples_per_pixel);
+  return render_bdpt(scene, options, render, samples_per_pixel(command));
 }
 
 PathResult render_with(const Scene& scene, const LightOptions& options, const RenderOptions& render,
                        const RenderCommand& command) {
-  return render_light(scene, options, render, command.samples_per_pixel);
+  return render_light(scene, options, render, samples_per_pixel(command));
 }
 
 Report report_of(const RenderCommand& /*command*/, const LangevinResult& result,
-                 const std::vector<OptionEntry>& options, const RenderOptions& render) {
-  return make_report(result, options, render);
+                 const LangevinOptions& options, const std::vector<OptionEntry>& entries,
+                 const RenderOptions& render) {
+  return make_report(result, options, entries, render);
 }
 
-Report report_of(const RenderCommand& command, const PathResult& result,
-                 const std::vector<OptionEntry>& options, const RenderOptions& render) {
-  return make_report(std::string(name_of(command.integrator)), result, options, render);
+template <class Options>
+Report report_of(const RenderCommand& command, const PathResult& result, const Options& /*options*/,
+                 const std::vector<OptionEntry>& entries, const RenderOptions& render) {
+  return make_report(std::string(name_of(command.integrator)), result, entries, render);
 }
 
 void check_outputs(const RenderCommand& command) {
@@ -100,10 +112,18 @@ bool apply_settings(const RenderCommand& command, const std::vector<OptionEntry>
   return has_depth;
 }
 
-/// A kernel without derivatives has nothing to check.
+/// Flags that this mode or kernel has no use for.
 template <class Options>
 void check_settings(const RenderCommand& command, const Options& options) {
   if constexpr (std::is_same_v<Options, LangevinOptions>) {
+    const bool chain = options.mode == Mode::Chain;
+    if (chain && command.samples_per_pixel)
+      throw UsageError(
+          "--spp is for the path, bdpt and light integrators and for mode=redistribution; "
+          "mode=chain takes --mutations-per-pixel");
+    if (!chain && command.mutations_per_pixel)
+      throw UsageError("--mutations-per-pixel is for mode=chain; mode=redistribution takes --spp");
+    if (!chain && command.check_gradients) throw UsageError("--check-gradients is for mode=chain");
     const KernelOptions& kernel = options.kernel;
     if (command.check_gradients && kernel.drift == Drift::None &&
         kernel.preconditioner == PreconditionerKind::Identity)
@@ -173,7 +193,7 @@ void render(const RenderCommand& command) {
     how.progress = [&](const Progress& progress) { bar.update(progress); };
     return render_with(loaded.scene, options, how, command);
   }();
-  Report report = report_of(command, result, option_entries, how);
+  Report report = report_of(command, result, options, option_entries, how);
   if (report.empty) throw RuntimeError("stopped before there was an image; nothing is written");
   if (report.stopped) talk.notice("stopped early: the image holds what was rendered so far");
   report.statistics["seconds"]["load"] = load_seconds;

@@ -84,6 +84,42 @@ std::string path_lengths(const LangevinStatistics& s) {
   return text;
 }
 
+void report_chains(const LangevinStatistics& s, const Image& image, Report& report) {
+  report.empty = s.mutations == 0 && !(s.direct_samples_per_pixel > 0.0);
+  const auto mutations = static_cast<double>(s.mutations);
+  const double rate = per_second(mutations, s.render_seconds - s.direct_seconds);
+  report.statistics.update(
+      {{"b_error", s.b_error},
+       {"direct", {{"mean", s.direct_mean}, {"samples_per_pixel", s.direct_samples_per_pixel}}},
+       {"mutations_per_second", rate},
+       {"path_lengths", s.path_length}});
+  report.statistics["seconds"]["direct"] = s.direct_seconds;
+  report.summary = {
+      fmt::format("langevin: {} x {} pixels, {} mutations ({:.4g} per pixel) in {:.2f} s, {:.4g} "
+                  "per second",
+                  image.width, image.height, s.mutations, mutations / pixel_count(image),
+                  s.render_seconds, rate),
+      fmt::format("b = {:.6g} +- {:.2g}", s.b, s.b_error)};
+  if (s.direct_samples_per_pixel > 0.0)
+    report.summary.push_back(
+        fmt::format("direct light: mean {:.6g}, {} samples per pixel in {:.2f} s", s.direct_mean,
+                    s.direct_samples_per_pixel, s.direct_seconds));
+}
+
+void report_redistribution(const LangevinStatistics& s, const Image& image, Report& report) {
+  report.empty = !(s.samples_per_pixel > 0.0);
+  report.statistics.update({{"samples_per_pixel", s.samples_per_pixel},
+                            {"starts", s.starts},
+                            {"remainder", s.remainder}});
+  report.summary = {
+      fmt::format("langevin: {} x {} pixels, {:.4g} samples and {:.4g} mutations per pixel in "
+                  "{:.2f} s",
+                  image.width, image.height, s.samples_per_pixel,
+                  static_cast<double>(s.mutations) / pixel_count(image), s.render_seconds),
+      fmt::format("mean {:.6g}, {:.2f} % of it by chains from {} samples", s.b,
+                  s.b > 0.0 ? 100.0 * s.remainder / s.b : 0.0, s.starts)};
+}
+
 void report_check(const GradientTable& check, Report& report) {
   report.statistics["gradient_check"] = cli::to_json(check);
   report.summary.push_back(summary_line(check));
@@ -93,24 +129,17 @@ void report_check(const GradientTable& check, Report& report) {
 
 }  // namespace
 
-Report make_report(const LangevinResult& result, const std::vector<OptionEntry>& options,
-                   const RenderOptions& render) {
+Report make_report(const LangevinResult& result, const LangevinOptions& options,
+                   const std::vector<OptionEntry>& entries, const RenderOptions& render) {
   const LangevinStatistics& s = result.statistics;
-  Report report = common_report("langevin", result.image, options, render);
+  Report report = common_report("langevin", result.image, entries, render);
   report.stopped = s.stopped;
-  report.empty = s.mutations == 0 && !(s.direct_samples_per_pixel > 0.0);
   report.metadata["driftlight:b"] = fmt::format("{}", s.b);
   report.metadata["driftlight:mutations"] = fmt::format("{}", s.mutations);
-
-  const auto mutations = static_cast<double>(s.mutations);
-  const double rate = per_second(mutations, s.render_seconds - s.direct_seconds);
   report.statistics.update(
       {{"stopped", s.stopped},
        {"b", s.b},
-       {"b_error", s.b_error},
-       {"direct", {{"mean", s.direct_mean}, {"samples_per_pixel", s.direct_samples_per_pixel}}},
        {"mutations", s.mutations},
-       {"mutations_per_second", rate},
        {"kernels", {{"large_step", to_json(s.large_step)}, {"small_step", to_json(s.small_step)}}},
        {"rejections",
         {{"missed", s.rejections.missed},
@@ -118,30 +147,21 @@ Report make_report(const LangevinResult& result, const std::vector<OptionEntry>&
          {"occluded", s.rejections.occluded},
          {"non_finite", s.rejections.non_finite},
          {"hastings", s.rejections.hastings}}},
-       {"path_lengths", s.path_length},
-       {"seconds",
-        {{"bootstrap", s.bootstrap_seconds},
-         {"render", s.render_seconds},
-         {"direct", s.direct_seconds}}}});
-  report.summary = {
-      fmt::format("langevin: {} x {} pixels, {} mutations ({:.4g} per pixel) in {:.2f} s, {:.4g} "
-                  "per second",
-                  result.image.width, result.image.height, s.mutations,
-                  mutations / pixel_count(result.image), s.render_seconds, rate),
-      fmt::format("b = {:.6g} +- {:.2g}", s.b, s.b_error)};
-  if (s.direct_samples_per_pixel > 0.0)
-    report.summary.push_back(
-        fmt::format("direct light: mean {:.6g}, {} samples per pixel in {:.2f} s", s.direct_mean,
-                    s.direct_samples_per_pixel, s.direct_seconds));
+       {"seconds", {{"bootstrap", s.bootstrap_seconds}, {"render", s.render_seconds}}}});
+  if (options.mode == Mode::Chain)
+    report_chains(s, result.image, report);
+  else
+    report_redistribution(s, result.image, report);
   report.details = {describe("large steps", s.large_step), describe("small steps", s.small_step),
-                    describe(s.rejections, s.small_step.proposed), path_lengths(s)};
+                    describe(s.rejections, s.small_step.proposed)};
+  if (options.mode == Mode::Chain) report.details.push_back(path_lengths(s));
   if (result.gradient_check) report_check(*result.gradient_check, report);
   return report;
 }
 
 Report make_report(const std::string& integrator, const PathResult& result,
-                   const std::vector<OptionEntry>& options, const RenderOptions& render) {
-  Report report = common_report(integrator, result.image, options, render);
+                   const std::vector<OptionEntry>& entries, const RenderOptions& render) {
+  Report report = common_report(integrator, result.image, entries, render);
   report.stopped = result.stopped;
   report.empty = !(result.samples_per_pixel > 0.0);
   report.metadata["driftlight:samples_per_pixel"] = fmt::format("{}", result.samples_per_pixel);

@@ -23,10 +23,10 @@ struct Report {
   std::string failure;               ///< what went wrong, if anything did
 };
 
-/// `options` are those that were used, with their values.
-Report make_report(const LangevinResult& result, const std::vector<OptionEntry>& options,
-                   const RenderOptions& render);
+/// `entries` are the options that were used, with their values.
+Report make_report(const LangevinResult& result, const LangevinOptions& options,
+                   const std::vector<OptionEntry>& entries, const RenderOptions& render);
 Report make_report(const std::string& integrator, const PathResult& result,
-                   const std::vector<OptionEntry>& options, const RenderOptions& render);
+                   const std::vector<OptionEntry>& entries, const RenderOptions& render);
 
 }  // namespace driftlight::cli

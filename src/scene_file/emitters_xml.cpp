@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "emitters_xml.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,6 +15,16 @@ namespace {
 
 const Rgbd kWhite{1, 1, 1};
 
+/// The rotation (or mirror rotation) in a transform that may also scale evenly: a scale means
+/// nothing for directions.
+Eigen::Matrix3d read_rotation(Properties& properties) {
+  const Eigen::Matrix3d linear = properties.transform("toWorld").linear();
+  const Eigen::Matrix3d rotation = linear / std::cbrt(std::abs(linear.determinant()));
+  if (!(rotation * rotation.transpose()).isIdentity(1e-3))
+    properties.fail("toWorld", "must be a rotation");
+  return rotation;
+}
+
 void read_point(Properties& properties, LoadContext& context) {
   const std::optional<Vec3d> position = properties.point("position");
   if (position && properties.has("toWorld"))
@@ -22,21 +34,41 @@ void read_point(Properties& properties, LoadContext& context) {
   if (emitter.intensity.maxCoeff() > 0.0) context.builder.add_emitter(emitter);
 }
 
+/// Degrees; at most `most`.
+double read_angle(Properties& properties, std::string_view name, double fallback, double most) {
+  const double angle = properties.number(name, fallback);
+  if (!(angle >= 0.0 && angle <= most))
+    properties.fail(name, fmt::format("{} is not an angle between 0 and {} degrees", angle, most));
+  return angle;
+}
+
+void read_spot(Properties& properties, LoadContext& context) {
+  if (properties.has("texture")) properties.fail("texture", "textured spots are not supported");
+  const double cutoff = read_angle(properties, "cutoffAngle", 20.0, 180.0);
+  if (cutoff == 0.0) properties.fail("cutoffAngle", "must be positive");
+  const double beam = read_angle(properties, "beamWidth", 0.75 * cutoff, cutoff);
+  const Vec3d axis = read_rotation(properties).col(2);
+  const SpotEmitter emitter(properties.transform("toWorld").translation(), axis,
+                            properties.color("intensity", kWhite), cutoff * kPi / 180.0,
+                            beam * kPi / 180.0);
+  if (emitter.intensity().maxCoeff() > 0.0) context.builder.add_emitter(emitter);
+}
+
+void read_directional(Properties& properties, LoadContext& context) {
+  const std::optional<Vec3d> direction = properties.vector("direction");
+  if (direction && properties.has("toWorld"))
+    properties.fail("toWorld", "give either 'direction' or 'toWorld'");
+  if (direction && direction->isZero(0.0)) properties.fail("direction", "must not be zero");
+  const Vec3d along = direction.value_or(properties.transform("toWorld").linear().col(2));
+  const DirectionalEmitter emitter{along.normalized(), properties.color("irradiance", kWhite)};
+  if (emitter.irradiance.maxCoeff() > 0.0) context.builder.add_emitter(emitter);
+}
+
 void read_constant(Properties& properties, LoadContext& context) {
   properties.transform("toWorld");  // turning a constant changes nothing
   const ConstantEnvironment emitter{properties.color("radiance", kWhite)};
   if (emitter.radiance.maxCoeff() > 0.0)
     with_location(properties.element(), [&] { context.builder.set_environment(emitter); });
-}
-
-/// The rotation (or mirror rotation) in a transform that may also scale evenly: neither a scale nor
-/// a shift means anything for an environment.
-Eigen::Matrix3d read_rotation(Properties& properties) {
-  const Eigen::Matrix3d linear = properties.transform("toWorld").linear();
-  const Eigen::Matrix3d rotation = linear / std::cbrt(std::abs(linear.determinant()));
-  if (!(rotation * rotation.transpose()).isIdentity(1e-3))
-    properties.fail("toWorld", "the transform of an envmap must be a rotation");
-  return rotation;
 }
 
 void read_environment_map(Properties& properties, LoadContext& context) {
@@ -59,8 +91,10 @@ void reject_area(Properties& properties, LoadContext&) {
 }
 
 using Reader = void (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, Reader>, 4> kEmitters{{
+constexpr std::array<std::pair<std::string_view, Reader>, 6> kEmitters{{
     {"point", &read_point},
+    {"spot", &read_spot},
+    {"directional", &read_directional},
     {"constant", &read_constant},
     {"envmap", &read_environment_map},
     {"area", &reject_area},

@@ -121,8 +121,13 @@ Rgbd Properties::color(std::string_view name, const Rgbd& fallback) {
   return child ? read_color(*child) : fallback;
 }
 
-std::optional<Vec3d> Properties::point(std::string_view name) {
-  const auto child = find(name, {"point"});
+std::optional<Vec3d> Properties::point(std::string_view name) { return coordinates(name, "point"); }
+std::optional<Vec3d> Properties::vector(std::string_view name) {
+  return coordinates(name, "vector");
+}
+
+std::optional<Vec3d> Properties::coordinates(std::string_view name, const std::string& tag) {
+  const auto child = find(name, {tag});
   if (!child) return std::nullopt;
   child->allow_attributes({"name", "x", "y", "z"});
   return Vec3d(child->number("x"), child->number("y"), child->number("z"));

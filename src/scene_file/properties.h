@@ -49,6 +49,7 @@ class Properties {
                      const std::vector<std::string>& valid);
   Rgbd color(std::string_view name, const Rgbd& fallback);
   std::optional<Vec3d> point(std::string_view name);
+  std::optional<Vec3d> vector(std::string_view name);
   /// Identity if there is none.
   Eigen::Affine3d transform(std::string_view name);
 
@@ -65,6 +66,7 @@ class Properties {
     bool used = false;
   };
 
+  std::optional<Vec3d> coordinates(std::string_view name, const std::string& tag);
   /// The child with this name, which must have one of the tags.
   std::optional<Element> find(std::string_view name, const std::vector<std::string>& tags);
 

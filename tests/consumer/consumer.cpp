@@ -32,7 +32,7 @@ double render(const std::filesystem::path& file) {
   std::ofstream(file) << kScene;
   const driftlight::LoadedScene loaded = driftlight::load_scene(file);
   const driftlight::LangevinResult result = driftlight::render_langevin(
-      loaded.scene, driftlight::LangevinOptions(), driftlight::RenderOptions(), 100.0);
+      loaded.scene, driftlight::LangevinOptions(), driftlight::RenderOptions(), 64.0);
   driftlight::write_image(file.parent_path() / "consumer.exr", result.image);
   double sum = 0;
   for (const float x : result.image.rgb) sum += static_cast<double>(x);

@@ -47,7 +47,13 @@ const std::vector<std::string>& required_classes() {
       "connection to sphere",
       "connection to point after diffuse",
       "connection to point after phong diffuse lobe",
-      "connection to point after rough conductor beckmann"};
+      "connection to point after rough conductor beckmann",
+      "connection to spot after diffuse",
+      "connection to spot after phong diffuse lobe",
+      "connection to spot after rough conductor ggx",
+      "connection to directional after diffuse",
+      "connection to directional after phong diffuse lobe",
+      "connection to directional after rough conductor ggx"};
   return classes;
 }
 

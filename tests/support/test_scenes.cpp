@@ -217,7 +217,7 @@ Scene glass() {
   make->add_shape(quad({-0.5, 0.1, 1.9}, {1.0, 0, 0.1}, {0, 1.1, 0}, false, 0.1), pane);
 
   const auto black = make.one_sided(Diffuse{gray(0.0)});
-  make->add_emitter({{1.5, 2.6, 1.2}, {6, 6, 5}});
+  make->add_emitter(PointEmitter{{1.5, 2.6, 1.2}, {6, 6, 5}});
   make->add_shape(quad({-1.2, 2.9, -0.4}, {1.6, 0, 0}, {0, 0, 1.6}), black, Rgbd{4, 4, 4});
   make->add_shape(sphere_at({1.5, 1.0, 1.4}, 0.25), black, Rgbd{8, 7, 6});
   make->add_shape(round_mesh({-1.5, 1.2, 0.0}, 0.35, 4, false), black, Rgbd{6, 7, 8});
@@ -251,7 +251,7 @@ Scene sun() {
       (Eigen::AngleAxisd(0.7, Vec3d::UnitY()) * Eigen::AngleAxisd(0.4, Vec3d::UnitX()))
           .toRotationMatrix();
   make->set_environment(EnvironmentMap(sun_bitmap(32, 16, 300.0F), turn, 0.8));
-  make->add_emitter({{1.0, 2.0, 1.5}, {2, 2, 2}});
+  make->add_emitter(PointEmitter{{1.0, 2.0, 1.5}, {2, 2, 2}});
   return make->build();
 }
 
@@ -259,6 +259,26 @@ Scene overcast() {
   Workshop make;
   add_yard(make, RoughDielectric{beckmann(0.1), 1.3, gray(1.0), gray(1.0)});
   make->set_environment(ConstantEnvironment{{0.8, 0.9, 1.0}});
+  return make->build();
+}
+
+Scene stage() {
+  Workshop make;
+  const auto plain = make.one_sided(Diffuse{gray(0.7)});
+  add_walls(make, make.one_sided(Phong{textured(8, 0.2, 0.6), gray(0.3), 15}),
+            make.one_sided(Diffuse{textured(8, 0.3, 0.8)}), plain);
+  make->add_shape(sphere_at({-0.8, 0.5, 0.2}, 0.5),
+                  make.one_sided(RoughConductor{ggx(0.25), kGoldEta, kGoldK, gray(1.0)}));
+  make->add_shape(round_mesh({0.5, 0.5, 0.3}, 0.5, 8), plain);
+  make->add_shape(sphere_at({1.2, 0.35, 0.9}, 0.35),
+                  make.one_sided(RoughDielectric{beckmann(0.25), kGlass, gray(1.0), gray(1.0)}));
+  make->add_shape(sphere_at({-0.2, 0.3, 1.1}, 0.3),
+                  make.one_sided(Dielectric{kGlass, gray(1.0), gray(1.0)}));
+  make->add_shape(quad({-1.8, 0.1, 1.0}, {0.2, 0, -0.8}, {0, 1.2, 0}),
+                  make.one_sided(Conductor{kGoldEta, kGoldK, gray(1.0)}));
+  make->add_emitter(SpotEmitter({0.3, 3.2, 2.0}, {-0.1, -3.0, -1.8}, {90, 80, 70}, 0.6, 0.2));
+  make->add_emitter(DirectionalEmitter{Vec3d(0.5, -1.0, -0.8).normalized(), {0.8, 1.0, 1.2}});
+  make->set_camera(look_at({0, 1.4, 3.6}, {0, 0.9, 0}, 0.5));
   return make->build();
 }
 
@@ -271,6 +291,7 @@ const std::vector<TestScene>& test_scenes() {
     result.push_back({"glass", glass(), 8});
     result.push_back({"sun", sun(), 6});
     result.push_back({"overcast", overcast(), 6});
+    result.push_back({"stage", stage(), 6});
     return result;
   }();
   return scenes;

@@ -22,6 +22,7 @@ struct TestScene {
 ///   glass      smooth and rough interfaces, mirrors, a point emitter
 ///   sun        glossy things under an environment map with a small bright sun, behind a window
 ///   overcast   the same kinds under a constant environment, seen through a rough window
+///   stage      diffuse and glossy things under a spot and parallel light, behind smooth glass
 const std::vector<TestScene>& test_scenes();
 
 /// Paths that carry light, drawn from a scene by its PathSampler.

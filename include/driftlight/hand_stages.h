@@ -1,0 +1,415 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Derivatives derived by hand: the stages (linearization.h). The differentials of hand_rules.h
+/// forward, in all local columns at once, and through them the residuals, in the order of
+/// ConstraintVisitor:
+///   slopes  r = m - n, m = h / h.n, h = w_i + e w_o:
+///           dr = (dh - m (n.dh)) / h.n - m (m.dn) - dn                                    (H19)
+///   diffuse r = w_o - c_o n:  dr = dw_o - c_o dn - n dc_o                                 (H20)
+///   Phong   r = w_o - mirror: dr = dw_o - (2 c_i dn + 2 n dc_i - dw_i)                    (H21)
+///   film    x = (right.v) / (2 a f), f = forward.v:
+///           dx = (right - (right.v) forward / f) / (2 a f) . dv                           (H22)
+///   spot    r = w_o: with its share of (H18)
+///   emission, of an area r = v - c n, c = n.v: (H20);  of a spot r = v;  the point by its own
+///   residuals, on the disk across parallel light r = y / R                                (H26)
+/// The two directions of the joining edge, w_o = w and w_i = -w, have dw of (H18) with dx and dy of
+/// both its ends.
+#pragma once
+
+#include "driftlight/hand_path.h"
+
+namespace driftlight::hand {
+
+/// The differential of a vector, in all local columns.
+struct Columns {
+  LocalRow x, y, z;
+
+  static Columns zero() { return {LocalRow::Zero(), LocalRow::Zero(), LocalRow::Zero()}; }
+  void set(int column, const Vec3d& v) {
+    x[column] = v.x();
+    y[column] = v.y();
+    z[column] = v.z();
+  }
+};
+
+inline LocalRow dot(const Vec3d& a, const Columns& b) {
+  return a.x() * b.x + a.y() * b.y + a.z() * b.z;
+}
+inline Columns outer(const Vec3d& a, const LocalRow& row) {
+  return {a.x() * row, a.y() * row, a.z() * row};
+}
+inline Columns operator*(double k, const Columns& a) { return {k * a.x, k * a.y, k * a.z}; }
+inline Columns operator+(const Columns& a, const Columns& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+inline Columns operator-(const Columns& a, const Columns& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+
+template <class Rules>
+class StageSweep : RecordedPath<Rules> {
+  using Base = RecordedPath<Rules>;
+  using Base::chart_;
+  using Base::is_connection;
+  using Base::path_;
+  using Base::result_;
+  using Base::scene_;
+  using Base::topology_;
+  using Base::vertex;
+
+ public:
+  StageSweep(const Scene& scene, const PathTopology& topology, const Chart& chart,
+             const Recorder<Rules>& path, Linearization& result)
+      : Base(scene, topology, chart, path, result) {}
+
+  /// Stages and residual rows.
+  void stages() {
+    result_.stage_count = 0;
+    row_count_ = 0;
+    if (topology_.has_light_side()) return stages_of_both_sides();
+    begin_at_sensor();
+    for (int k = 0; k < path_.count; ++k) {
+      const Vertex& x = vertex(k);
+      const Arrival at = arrive(x);
+      position(*x.shape, at.dx);
+      if (is_connection(k)) {
+        connection_rows(x, at);
+        close(Stage::Kind::Terminal, topology_.end == PathEnd::AreaConnection);
+        return;
+      }
+      leave(x, at);
+    }
+    end();
+    close(Stage::Kind::Terminal, false);
+  }
+
+ private:
+  /// Tangents of the ray under way: of the plane of the vertex it leaves (none at the sensor) and
+  /// of its direction.
+  struct Tangents {
+    Vec3d xi_t = Vec3d::Zero();
+    Vec3d xi_b = Vec3d::Zero();
+    Vec3d omega_t = Vec3d::Zero();
+    Vec3d omega_b = Vec3d::Zero();
+  };
+  /// The differentials of a vertex that the ray comes to.
+  struct Arrival {
+    Columns dx = Columns::zero();
+    Columns dwi = Columns::zero();
+    Columns dn = Columns::zero();
+  };
+
+  /// The next block, in the columns of u.
+  Columns block_columns() const {
+    Columns d = Columns::zero();
+    d.set(columns_.u, chart_.block(block_).t);
+    d.set(columns_.u + 1, chart_.block(block_).b);
+    return d;
+  }
+  /// The ray leaves in the direction of the next block.
+  void take_direction() {
+    ray_.omega_t = chart_.block(block_).t;
+    ray_.omega_b = chart_.block(block_).b;
+    ++block_;
+  }
+  void set_plane(const Vec3d& n) {
+    const TangentBasis plane = tangent_basis(n);
+    ray_.xi_t = plane.t;
+    ray_.xi_b = plane.b;
+  }
+
+  void begin_at_sensor() {
+    film(block_columns());
+    close(Stage::Kind::Free, true);
+    take_direction();
+  }
+
+  Arrival arrive(const Vertex& x) const {
+    Arrival at;
+    at.dx = hit(-x.wi, x.n_g, x.hit_cosine, x.length);
+    at.dwi.set(columns_.omega, -ray_.omega_t);
+    at.dwi.set(columns_.omega + 1, -ray_.omega_b);
+    at.dn = normal(x.surface, at.dx);
+    return at;
+  }
+
+  /// Scattering, and the ray that goes on.
+  void leave(const Vertex& x, const Arrival& at) {
+    set_plane(x.n_g);
+    if (x.delta) {
+      const TangentBasis basis = tangent_basis(x.wo);
+      ray_.omega_t = basis.t;
+      ray_.omega_b = basis.b;
+      const Columns dv = delta(x, at.dwi, at.dn);
+      Stage& stage = close(Stage::Kind::Delta, false);
+      stage.position = map(at.dx, ray_.xi_t, ray_.xi_b);
+      stage.direction = map(dv, ray_.omega_t, ray_.omega_b);
+    } else {
+      residuals(x, at.dwi, block_columns(), at.dn);
+      take_direction();
+      Stage& stage = close(Stage::Kind::Free, true);
+      stage.position = map(at.dx, ray_.xi_t, ray_.xi_b);
+    }
+  }
+
+  // ---- With a light side ----
+
+  void stages_of_both_sides() {
+    Arrival x;
+    if (path_.count > 0) {
+      begin_at_sensor();
+      for (int k = 0; k + 1 < path_.count; ++k) pass(k);
+      x = arrive(vertex(path_.count - 1));
+    }
+    result_.sensor_stages = result_.stage_count;
+    columns_ = kLightColumns;
+    emission();
+    for (int k = topology_.scatter_count - 1; k > topology_.camera_count(); --k) pass(k);
+    const Arrival y = arrive(this->light_end());
+    join(x, y);
+    close(Stage::Kind::Terminal, false);
+  }
+
+  void pass(int k) {
+    const Vertex& x = vertex(k);
+    const Arrival at = arrive(x);
+    position(*x.shape, at.dx);
+    leave(x, at);
+  }
+
+  /// (H26)
+  void emission() {
+    ray_ = {};
+    Columns dn = Columns::zero();
+    Columns dy = Columns::zero();
+    if (topology_.end != PathEnd::PointEmission) {
+      dy = block_columns();
+      if (topology_.end == PathEnd::AreaEmission)
+        position(this->emitter_shape(), dy);
+      else
+        add(2.0 / (3.0 * scene_.radius()), dy);
+      close(Stage::Kind::Point, true);
+      ray_.xi_t = chart_.block(block_).t;
+      ray_.xi_b = chart_.block(block_).b;
+      ++block_;
+      dy = Columns::zero();
+      dy.set(columns_.xi, ray_.xi_t);
+      dy.set(columns_.xi + 1, ray_.xi_b);
+    }
+    if (topology_.end == PathEnd::DirectionalEmission) return;
+    const Vec3d& v = path_.emitted;
+    const Columns dv = block_columns();
+    Vec3d normal = v;
+    if (topology_.end == PathEnd::AreaEmission) {
+      normal = path_.normal;
+      dn = this->emitter_curvature() * dy;
+      tangential(normal, v, normal.dot(v), dv, dn, 1.0);
+    } else if (const SpotEmitter* light = this->spot()) {
+      add(1.0 / (3.0 * light->width()), dv);
+    }
+    set_plane(normal);
+    take_direction();
+    Stage& stage = close(Stage::Kind::Free, true);
+    stage.position = map(dy, ray_.xi_t, ray_.xi_b);
+  }
+
+  /// Both ends of the joining edge, whose columns are those of both sides: (H18).
+  void join(const Arrival& x, const Arrival& y) {
+    const Vertex& at = this->light_end();
+    const Vec3d w = -at.wo;
+    const double r = (at.p - this->sensor_end()).norm();
+    const Columns de = y.dx - x.dx;
+    const Columns dw = (1.0 / r) * (de - outer(w, dot(w, de)));
+    if (path_.count > 0) {
+      const Vertex& from = vertex(path_.count - 1);
+      position(*from.shape, x.dx);
+      residuals(from, x.dwi, dw, x.dn);
+    } else {
+      film(dw);
+    }
+    position(*at.shape, y.dx);
+    residuals(at, y.dwi, -1.0 * dw, y.dn);
+  }
+
+  Stage& close(Stage::Kind kind, bool has_block) {
+    Stage& stage = result_.stages[static_cast<std::size_t>(result_.stage_count++)];
+    stage.kind = kind;
+    stage.has_block = has_block;
+    stage.rows_end = row_count_;
+    return stage;
+  }
+  void add(const LocalRow& row) { result_.rows.row(row_count_++) = row; }
+  /// `factor` is sqrt(w) / 3.
+  void add(double factor, const Columns& dr) {
+    add(factor * dr.x);
+    add(factor * dr.y);
+    add(factor * dr.z);
+  }
+
+  Stage::Map map(const Columns& d, const Vec3d& t, const Vec3d& b) const {
+    Stage::Map m;
+    m.row(0) = dot(t, d).template segment<4>(columns_.xi).matrix();
+    m.row(1) = dot(b, d).template segment<4>(columns_.xi).matrix();
+    return m;
+  }
+
+  /// (H14) for the four columns of the incoming ray.
+  Columns hit(const Vec3d& v, const Vec3d& n, double cosine, double length) const {
+    Columns d = Columns::zero();
+    d.set(columns_.xi, ray_.xi_t);
+    d.set(columns_.xi + 1, ray_.xi_b);
+    d.set(columns_.omega, length * ray_.omega_t);
+    d.set(columns_.omega + 1, length * ray_.omega_b);
+    return d - outer(v, dot(n, d) / cosine);
+  }
+
+  static Columns normal(const SurfaceDifferential& surface, const Columns& dx) {
+    if (surface.interpolated)
+      return outer(surface.a1, dot(surface.c1, dx)) + outer(surface.a2, dot(surface.c2, dx));
+    if (surface.curvature != 0.0) return surface.curvature * dx;
+    return Columns::zero();
+  }
+
+  /// (H12), (H13)
+  static Columns delta(const Vertex& x, const Columns& dwi, const Columns& dn) {
+    const auto map = Rules::delta_map(*x.bsdf, x.cos_i, x.scattering);
+    const LocalRow d_cos = dot(x.wi, dn) + dot(x.n_s, dwi);
+    return map.normal_factor * dn + outer(x.n_s, map.n_factor * d_cos) + map.wi_factor * dwi;
+  }
+
+  /// (H22)
+  void film(const Columns& dv) {
+    const PerspectiveCamera& camera = scene_.camera();
+    const Vec3d& v = path_.v0;
+    const double f = camera.cosine(v);
+    const double factor = std::sqrt(12.0) / 3.0;
+    const Vec3d x = camera.right - camera.right.dot(v) / f * camera.forward;
+    const Vec3d y = camera.up - camera.up.dot(v) / f * camera.forward;
+    add(factor * 0.5 / (camera.half_width * f) * dot(x, dv));
+    add(-factor * 0.5 / (camera.half_height * f) * dot(y, dv));
+  }
+
+  void position(const Shape& shape, const Columns& dx) {
+    for (int i = 0; i < 3; ++i) {
+      const Vec3d row = shape.extent.whitening.row(i) / 3.0;
+      if (!row.isZero(0.0)) add(dot(row, dx));
+    }
+  }
+
+  void residuals(const Vertex& x, const Columns& dwi, const Columns& dwo, const Columns& dn) {
+    std::visit([&](const auto& bsdf) { constrain(bsdf, x, dwi, dwo, dn); }, *x.bsdf);
+  }
+
+  /// (H19)
+  void slopes(const Microfacets& microfacets, double e, const Vertex& x, const Columns& dwi,
+              const Columns& dwo, const Columns& dn) {
+    const double hn = x.cos_i + e * x.cos_o;
+    const Vec3d m = (x.wi + e * x.wo) / hn;
+    const double s2 = (m - x.n_s).squaredNorm();
+    const double factor = 1.0 / (3.0 * std::sqrt(microfacets.slope_variance(s2)));
+    const Columns dh = dwi + e * dwo;
+    const LocalRow along = dot(x.n_s, dh) / hn + dot(m, dn);
+    add(factor, (1.0 / hn) * dh - outer(m, along) - dn);
+  }
+  /// (H20)
+  void diffuse(const Vertex& x, const Columns& dwo, const Columns& dn, double share) {
+    tangential(x.n_s, x.wo, x.cos_o, dwo, dn, share);
+  }
+  void tangential(const Vec3d& n, const Vec3d& v, double cosine, const Columns& dv,
+                  const Columns& dn, double share) {
+    const double factor = std::sqrt(share) / (3.0 * std::abs(cosine));
+    const LocalRow d_cos = dot(n, dv) + dot(v, dn);
+    add(factor, dv - cosine * dn - outer(n, d_cos));
+  }
+
+  void constrain(const Diffuse&, const Vertex& x, const Columns&, const Columns& dwo,
+                 const Columns& dn) {
+    diffuse(x, dwo, dn, 1.0);
+  }
+  void constrain(const Conductor&, const Vertex&, const Columns&, const Columns&, const Columns&) {}
+  void constrain(const Dielectric&, const Vertex&, const Columns&, const Columns&, const Columns&) {
+  }
+  void constrain(const RoughConductor& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
+                 const Columns& dn) {
+    slopes(b.microfacets, 1.0, x, dwi, dwo, dn);
+  }
+  void constrain(const RoughDielectric& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
+                 const Columns& dn) {
+    const double eta = x.cos_i > 0.0 ? b.eta : 1.0 / b.eta;
+    slopes(b.microfacets, x.scattering == Scattering::Reflection ? 1.0 : eta, x, dwi, dwo, dn);
+  }
+  /// (H21)
+  void constrain(const Phong& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
+                 const Columns& dn) {
+    const double lobe = detail::phong_lobe(b, 2.0 * x.cos_i * x.cos_o - x.io);
+    const double glossy = luminance(b.specular_reflectance.eval(x.uv)) * lobe;
+    const double matt = luminance(b.diffuse_reflectance.eval(x.uv)) * kInvPi;
+    if (!(glossy + matt > 0.0)) return;
+    const double share = glossy / (glossy + matt);
+    if (share > 0.0) {
+      const LocalRow d_cos = dot(x.wi, dn) + dot(x.n_s, dwi);
+      const Columns mirror = 2.0 * x.cos_i * dn + outer(x.n_s, 2.0 * d_cos) - dwi;
+      add(std::sqrt(share * b.exponent) / 3.0, dwo - mirror);
+    }
+    if (share < 1.0) diffuse(x, dwo, dn, 1.0 - share);
+  }
+
+  /// w_o = e / r with e = y - x: (H18)
+  void connection_rows(const Vertex& x, const Arrival& at) {
+    if (topology_.end == PathEnd::DirectionalConnection)
+      return residuals(x, at.dwi, Columns::zero(), at.dn);
+    const double r = (this->connection_point() - x.p).norm();
+    const bool area = topology_.end == PathEnd::AreaConnection;
+    const Columns dy = area ? block_columns() : Columns::zero();
+    const Columns de = dy - at.dx;
+    const Columns dwo = (1.0 / r) * (de - outer(x.wo, dot(x.wo, de)));
+    residuals(x, at.dwi, dwo, at.dn);
+    if (area) position(this->emitter_shape(), dy);
+    if (const SpotEmitter* light = this->spot()) add(1.0 / (3.0 * light->width()), dwo);
+  }
+
+  /// The emitter that is hit, or the environment.
+  void end() {
+    if (topology_.end == PathEnd::Environment) {
+      const auto* map = std::get_if<EnvironmentMap>(&this->emitter());
+      if (map == nullptr) return;
+      Columns dv = Columns::zero();
+      dv.set(columns_.omega, ray_.omega_t);
+      dv.set(columns_.omega + 1, ray_.omega_b);
+      add(std::sqrt(environment_precision(*map)) / 3.0, dv);
+      return;
+    }
+    const Hit& hit_at = topology_.vertices[topology_.scatter_count].hit;
+    const Shape& shape = scene_.shapes()[hit_at.shape];
+    const Vec3d& from = path_.origin(path_.count);
+    const Vec3d& v = path_.count == 0 ? path_.v0 : vertex(path_.count - 1).wo;
+    const double length = (path_.end - from).dot(v);
+    const Vec3d n = surface_normal(shape.geometry, hit_at.primitive, path_.end);
+    const double cosine = Rules::hit_cosine(shape.geometry, from, v, n);
+    position(shape, hit(v, n, cosine, length));
+  }
+
+  static Vec3d surface_normal(const Geometry& geometry, std::uint32_t primitive, const Vec3d& p) {
+    if (const auto* sphere = std::get_if<Sphere>(&geometry))
+      return (p - sphere->center) / sphere->radius;
+    if (const auto* disk = std::get_if<Disk>(&geometry)) return disk->u.cross(disk->v).normalized();
+    return geometric_normal(std::get<TriangleMesh>(geometry), primitive);
+  }
+
+  /// |grad log L|^2 along the sphere, between 1 and a texel's.
+  double environment_precision(const EnvironmentMap& map) const {
+    const Vec3d& v = path_.last_v;
+    const Vec3d slope = map.gradient(v).transpose() * kLuminance.matrix();
+    const double light = luminance(path_.radiance);
+    const double tangential2 = (slope - v.dot(slope) * v).squaredNorm() / (light * light);
+    const double texel = map.texel_angle();
+    if (!(tangential2 > 1.0)) return 1.0;
+    return std::min(tangential2, 1.0 / (texel * texel));
+  }
+
+  LocalColumns columns_ = kSensorColumns;
+  Tangents ray_;
+  int block_ = 0;  ///< the next
+  int row_count_ = 0;
+};
+
+}  // namespace driftlight::hand

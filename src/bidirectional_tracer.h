@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Bidirectional path tracing (Lafortune and Willems 1993; Veach 1997, ch. 10): for each sample a
+/// subpath from the sensor, one from the light, and all connections between them and to freshly
+/// drawn emitter points.
+#pragma once
+
+#include <cmath>
+
+#include "strategy_weights.h"
+
+namespace driftlight {
+
+/// The path x_0 .. x_(s+t-1) that strategy (s, t) has found.
+struct FoundPath {
+  int s;
+  int t;
+  const Vec3d& v;              ///< v_0 of the subpath from the sensor
+  const Subpath& from_sensor;  ///< x_1 .. x_(t-1) and more
+  const Subpath& from_light;   ///< x_(n-1) .. x_t and more, for s > 1
+  const LightEnd& end;         ///< x_n
+  /// The inverse of the probability with which roulette has spared it; a factor of its value.
+  double roulette;
+};
+
+/// Reports each path that it finds to the sink:
+///   add(value, path)           for the film point that the sample was asked for,
+///   splat(film, value, path)   for another one, s > 1 and t = 1.
+/// Values are weighted by strategy_weights.h.
+class BidirectionalTracer {
+ public:
+  BidirectionalTracer(const Scene& scene, MisHeuristic heuristic, int max_depth)
+      : scene_(scene),
+        tracer_(scene, heuristic),
+        weights_(scene, heuristic),
+        max_depth_(max_depth) {}
+
+  template <class Sink>
+  void sample(const Vec2d& film, Rng& rng, Sink& sink) {
+    v_ = scene_.camera().direction(film);
+    const auto escape = tracer_.trace(Walk::FromSensor, tracer_.leave_sensor(v_),
+                                      RayFollower(scene_, v_), max_depth_, rng, from_sensor_);
+    trace_from_light(rng);
+    for (int t = 2; t < from_sensor_.size() + 2; ++t) {
+      const SubpathVertex& z = from_sensor_[t - 2];
+      hit_area(z, t, sink);
+      if (z.delta || t > max_depth_) continue;
+      connect_to_light(z, t, rng, sink);
+      for (int s = 2; s < from_light_.size() + 2 && s + t <= max_depth_ + 1; ++s)
+        if (!from_light_[s - 2].delta) connect(z, t, from_light_[s - 2], s, sink);
+    }
+    if (escape) hit_environment(*escape, sink);
+    for (int s = 2; s < from_light_.size() + 2; ++s)
+      if (!from_light_[s - 2].delta) connect_to_sensor(from_light_[s - 2], s, sink);
+  }
+
+ private:
+  void trace_from_light(Rng& rng) {
+    end_ = sample_light_end(scene_, rng);
+    const Emission emission = sample_emission(scene_, end_, rng);
+    tracer_.trace(Walk::FromLight, tracer_.leave_light(end_, emission),
+                  RayFollower(scene_, emission.origin, emission.start, emission.direction),
+                  max_depth_ - 1, rng, from_light_);
+  }
+
+  template <class Sink>
+  void hit_area(const SubpathVertex& z, int t, Sink& sink) const {
+    const auto end = light_end_at(scene_, z.surface);
+    if (!end) return;
+    const double w = weights_.hit(z, t, *end, end->n.dot(z.surface.wi));
+    sink.add(w * z.throughput * end->emitted, path(0, t, *end, z.roulette));
+  }
+
+  template <class Sink>
+  void hit_environment(const Departure& escape, Sink& sink) const {
+    const auto end = light_end_toward(scene_, escape.direction);
+    if (!end) return;
+    const int t = from_sensor_.size() + 2;
+    const double w = weights_.hit(tracer_.arrive_at_infinity(escape), t, *end, 1.0);
+    sink.add(w * escape.throughput * end->emitted, path(0, t, *end, escape.roulette));
+  }
+
+  /// s = 1: f_s |n_s . wo| L cos / (p(y) r^2), with a spot's falloff
+  template <class Sink>
+  void connect_to_light(const SubpathVertex& z, int t, Rng& rng, Sink& sink) const {
+    const LightEnd end = sample_light_end(scene_, rng);
+    const SurfaceHit& x = z.surface;
+    const LightEdge edge = edge_to(end, x.at.p);
+    if (!edge.lit() || !passes(x.at, x.wi, edge.direction)) return;
+    const Rgbd f = scattered(x, x.wi, edge.direction);
+    if (!(f.maxCoeff() > 0.0) || !reaches(scene_, end, x, edge)) return;
+    const double geometry = edge.falloff * edge.cosine * edge.inverse_r2 / end.density;
+    const double w = weights_.emitter(z, end, edge);
+    sink.add(w * geometry * z.throughput * f * end.emitted, path(1, t, end, z.roulette));
+  }
+
+  /// s > 1, t > 1: f_z f_y |n_g . wi| / (r^2 |n_g . wo|), the cosines those at y, as in
+  /// SubpathTracer::depart.
+  template <class Sink>
+  void connect(const SubpathVertex& z, int t, const SubpathVertex& y, int s, Sink& sink) const {
+    const SurfaceHit& a = z.surface;
+    const SurfaceHit& b = y.surface;
+    const Vec3d edge = b.at.p - a.at.p;
+    const double inverse_r2 = 1.0 / edge.squaredNorm();
+    const Vec3d v = edge * std::sqrt(inverse_r2);
+    const Vec3d back = -v;
+    if (!passes(a.at, a.wi, v) || !passes(b.at, back, b.wi)) return;
+    const Rgbd f = scattered(a, a.wi, v) * scattered(b, back, b.wi);
+    if (!(f.maxCoeff() > 0.0)) return;
+    if (scene_.occluded(scene_.leave(a.at.p, a.at.n_g, v), scene_.leave(b.at.p, b.at.n_g, back)))
+      return;
+    const double geometry = std::abs(b.at.n_g.dot(v) / b.at.n_g.dot(b.wi)) * inverse_r2;
+    const double w = weights_.connection(z, y, v, inverse_r2);
+    sink.add(w * geometry * z.throughput * f * y.throughput,
+             path(s, t, end_, z.roulette * y.roulette));
+  }
+
+  /// t = 1
+  template <class Sink>
+  void connect_to_sensor(const SubpathVertex& y, int s, Sink& sink) const {
+    const auto seen = driftlight::connect_to_sensor(scene_, y);
+    if (seen)
+      sink.splat(seen->film, weights_.sensor(y, *seen) * seen->value, path(s, 1, end_, y.roulette));
+  }
+
+  FoundPath path(int s, int t, const LightEnd& end, double roulette) const {
+    return {s, t, v_, from_sensor_, from_light_, end, roulette};
+  }
+
+  const Scene& scene_;
+  SubpathTracer tracer_;
+  StrategyWeights weights_;
+  int max_depth_;
+  // Of the sample in hand.
+  Vec3d v_{0, 0, 0};
+  LightEnd end_;  ///< where `from_light_` comes from
+  Subpath from_sensor_;
+  Subpath from_light_;
+};
+
+}  // namespace driftlight

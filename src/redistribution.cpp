@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "redistribution.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "driftlight/film.h"
+#include "exact_sum.h"
+#include "found_path.h"
+#include "pass_loop.h"
+#include "remainder.h"
+#include "sample_film.h"
+
+namespace driftlight {
+namespace {
+
+/// Samples of the pilot that learns the brightness.
+constexpr std::uint64_t kPilotSamples = 65536;
+/// Most chains that start from one sample, and how much longer than usual they may become.
+constexpr double kMostChains = 16;
+constexpr double kMostStretch = 16;
+/// Least deposit of a mutation, in units of the brightness of a pixel's sample: below it more
+/// mutations no longer pay.
+constexpr double kLeastDeposit = 0.2;
+
+/// Collects the unweighted luminances w m of what is found.
+class PilotSink {
+ public:
+  PilotSink(const Vec2d& film, std::vector<FilmValue>& found) : film_(film), found_(found) {}
+
+  void add(const Rgbd& value, const FoundPath& path) { splat(film_, value, path); }
+  void splat(const Vec2d& film, const Rgbd& value, const FoundPath& /*path*/) {
+    const double y = luminance(value);
+    if (std::isfinite(y) && y > 0.0) found_.push_back({film, y});
+  }
+
+ private:
+  Vec2d film_;
+  std::vector<FilmValue>& found_;
+};
+
+BrightnessMap pilot(const Scene& scene, const LangevinOptions& options, std::uint64_t seed) {
+  constexpr std::uint64_t kTask = 256;
+  std::vector<std::vector<FilmValue>> found(kPilotSamples / kTask);
+  tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t i) {
+    BidirectionalTracer tracer(scene, MisHeuristic::Balance, options.max_depth);
+    for (std::uint64_t k = 0; k < kTask; ++k) {
+      Rng rng(seed, Stream::Pilot, i * kTask + k);
+      const Vec2d film = rng.uniform2();
+      PilotSink sink(film, found[i]);
+      tracer.sample(film, rng, sink);
+    }
+  });
+  std::vector<FilmValue> all;
+  for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());
+  return BrightnessMap(all, static_cast<double>(kPilotSamples));
+}
+
+/// What all samples of a render share.
+struct Redistribution {
+  const Scene& scene;
+  const LangevinOptions& options;
+  StepLayers* layers;
+  BrightnessMap brightness;
+  Remainder remainder;
+  Film film;       ///< of the chains, in units of `unit`
+  double unit;     ///< bright enough that fixed point does not overflow
+  double deposit;  ///< epsilon
+  ExactSum remainders;
+
+  Redistribution(const Scene& of_scene, const LangevinOptions& with, const RenderOptions& render)
+      : scene(of_scene),
+        options(with),
+        layers(render.layers),
+        brightness(pilot(scene, options, render.seed)),
+        remainder(scene, brightness, options.redistribution.threshold),
+        film(scene.camera().film_width, scene.camera().film_height),
+        unit(64.0 * brightness.max()),
+        deposit(kLeastDeposit) {}
+
+  /// From the mean remainder of a sample so far.
+  void set_deposit(double samples) {
+    const double mean = remainders.value() / samples;
+    deposit = std::max(kLeastDeposit, mean / options.redistribution.mutations_per_sample);
+  }
+
+  void count(const ChainFigures& figures) {
+    accepted_.add(figures.small_step.accepted);
+    const std::lock_guard lock(mutex_);
+    statistics_.small_step.proposed += figures.small_step.proposed;
+    statistics_.rejections += figures.rejections;
+    ++statistics_.starts;
+  }
+  LangevinStatistics statistics() const {
+    LangevinStatistics result = statistics_;
+    result.mutations = result.small_step.proposed;
+    result.small_step.accepted = accepted_.value();
+    return result;
+  }
+
+ private:
+  ExactSum accepted_;
+  std::mutex mutex_;
+  LangevinStatistics statistics_;
+};
+
+/// One bidirectional sample, then the chains that start from it.
+class RedistributionSampler {
+ public:
+  explicit RedistributionSampler(Redistribution& common)
+      : common_(common),
+        tracer_(common.scene, MisHeuristic::Balance, common.options.max_depth),
+        chain_(common.scene, common.options.kernel, common.remainder, common.layers) {}
+
+  void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& film_sink) {
+    starts_.clear();
+    Sink sink{*this, film, film_sink};
+    tracer_.sample(film, rng, sink);
+    for (const Start& start : starts_) spread(start, rng);
+  }
+
+ private:
+  /// A path with a remainder, times its roulette.
+  struct Start {
+    PathTopology topology;
+    PathCoordinates coordinates;
+    Contribution contribution;
+    Share share;
+    double remainder;
+  };
+
+  /// Puts on the film what samples carry.
+  struct Sink {
+    RedistributionSampler& sampler;
+    Vec2d film;
+    SampleFilm::Sink& film_sink;
+
+    void add(const Rgbd& value, const FoundPath& path) {
+      film_sink.add(value * sampler.share_of_sample(film, value, path));
+    }
+    void splat(const Vec2d& at, const Rgbd& value, const FoundPath& path) {
+      film_sink.splat(at, value * sampler.share_of_sample(at, value, path));
+    }
+  };
+
+  /// min(w, tau) / w; keeps the path as a start if that is below 1.
+  double share_of_sample(const Vec2d& film, const Rgbd& value, const FoundPath& path) {
+    const double tau = common_.remainder.tau();
+    // By balance weights the value is f / q.
+    const double w = luminance(value) / (path.roulette * common_.brightness(film));
+    if (!(w > tau)) return 1.0;
+    const auto sample = state_of(common_.scene, path, common_.options.phase_space);
+    if (!sample) return 1.0;
+    Start start{sample->topology, sample->coordinates,
+                contribution(common_.scene, sample->topology, sample->coordinates), Share{}, 0.0};
+    start.share = common_.remainder.share(start.topology, start.coordinates, start.contribution);
+    if (!std::isfinite(start.share.log_remainder)) return 1.0;
+    start.remainder = path.roulette * (start.share.w - tau);
+    starts_.push_back(start);
+    return tau / start.share.w;
+  }
+
+  /// Chains of mutations that deposit epsilon each; if they would be too many, then longer ones,
+  /// and if these are too long, mutations that deposit more.
+  void spread(const Start& start, Rng& rng) {
+    common_.remainders.add(start.remainder);
+    const double length = common_.options.redistribution.chain_length;
+    double deposit = common_.deposit;
+    double mutations = length;
+    double chains = std::floor(start.remainder / (deposit * length) + rng.uniform());
+    if (chains > kMostChains) {
+      mutations =
+          std::ceil(std::min(start.remainder / (deposit * kMostChains), kMostStretch * length));
+      chains = kMostChains;
+      deposit = start.remainder / (mutations * chains);
+    }
+    if (!(chains > 0.0)) return;
+    chain_.start_at(start.topology, start.coordinates, start.contribution, start.share);
+    for (double i = 0; i < chains; ++i)
+      chain_.run(static_cast<std::uint64_t>(mutations), rng,
+                 [&](const Share& share, const Rgbd& color, double weight) {
+                   common_.film.splat(share.film, color,
+                                      weight * deposit * share.brightness / common_.unit);
+                 });
+    common_.count(chain_.take_statistics());
+  }
+
+  Redistribution& common_;
+  BidirectionalTracer tracer_;
+  RemainderChain chain_;
+  std::vector<Start> starts_;
+};
+
+}  // namespace
+
+LangevinResult render_redistribution(const Scene& scene, const LangevinOptions& options,
+                                     const RenderOptions& render, double samples_per_pixel) {
+  const Stopwatch watch;
+  Redistribution common(scene, options, render);
+  const double pilot_seconds = watch.seconds();
+  SampleFilm film(scene.camera(), render.seed, 0);
+  const RedistributionSampler sampler(common);
+  const PathResult samples =
+      run_passes(render, static_cast<int>(samples_per_pixel), [&](std::uint64_t index) {
+        film.pass(index, sampler);
+        common.set_deposit(static_cast<double>(index + 1) * scene.camera().pixel_count());
+      });
+
+  LangevinResult result;
+  result.statistics = common.statistics();
+  result.image = film.image(samples.samples_per_pixel);
+  const Image chains = common.film.develop(common.unit / std::max(1.0, samples.samples_per_pixel));
+  for (std::size_t i = 0; i < chains.rgb.size(); ++i) result.image.rgb[i] += chains.rgb[i];
+  result.statistics.b = mean_luminance(result.image);
+  result.statistics.remainder = mean_luminance(chains);
+  result.statistics.samples_per_pixel = samples.samples_per_pixel;
+  result.statistics.stopped = samples.stopped;
+  result.statistics.bootstrap_seconds = pilot_seconds;
+  result.statistics.render_seconds = samples.render_seconds;
+  return result;
+}
+
+}  // namespace driftlight

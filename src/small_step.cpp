@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "driftlight/small_step.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "driftlight/divergence.h"
+
+namespace driftlight {
+namespace {
+
+/// Traces and evaluates the coordinates of `to` as a path like `from`; counts why it fails.
+bool evaluate(const Scene& scene, const ChainState& from, ChainState& to, Rejections& rejections) {
+  switch (trace(scene, from.topology, to.coordinates, to.topology)) {
+    case TraceStatus::Ok:
+      break;
+    case TraceStatus::Missed:
+      ++rejections.missed;
+      return false;
+    case TraceStatus::OtherLobe:
+      ++rejections.other_lobe;
+      return false;
+    case TraceStatus::Occluded:
+      ++rejections.occluded;
+      return false;
+  }
+  to.has_step = false;
+  to.log_weight = std::numeric_limits<double>::quiet_NaN();
+  to.contribution = contribution(scene, to.topology, to.coordinates);
+  if (std::isfinite(to.contribution.log_target)) return true;
+  // log f = -infinity is a path without light, as a missed one; all else is a numerical failure.
+  if (to.contribution.log_target == -std::numeric_limits<double>::infinity())
+    ++rejections.missed;
+  else
+    ++rejections.non_finite;
+  return false;
+}
+
+}  // namespace
+
+double log_acceptance(double log_target_from, double log_target_to, double log_pdf_forward,
+                      double log_pdf_reverse) {
+  const double log_ratio = log_target_to - log_target_from + log_pdf_reverse - log_pdf_forward;
+  return std::isnan(log_ratio) ? -std::numeric_limits<double>::infinity()
+                               : std::min(0.0, log_ratio);
+}
+
+void prepare_step(const Scene& scene, const KernelOptions& options, ChainState& state) {
+  const DerivativeRequest request{
+      .gradient = options.drift != Drift::None,
+      .constraints = options.preconditioner == PreconditionerKind::Constraints};
+  state.chart = Chart(scene, state.topology, state.coordinates);
+  state.has_step = true;
+  state.figures.reset();
+  Linearization path;
+  linearize(scene, state.topology, state.chart, options.derivatives, request, path);
+  std::optional<Vector> div;
+  if (options.drift == Drift::Full && request.constraints) {
+    div = divergence(scene, state.topology, state.chart, options.derivatives);
+    if (!div->allFinite()) div.reset();
+  }
+  state.finite = state.step.assign(options, path, div ? &*div : nullptr);
+}
+
+void SmallStep::prepare(ChainState& state) {
+  prepare_step(scene_, options_, state);
+  if (probe_ != nullptr) probe_->visit(state.topology, state.coordinates);
+}
+
+bool SmallStep::propose(ChainState& from, ChainState& to, Rng& rng, Rejections& rejections) {
+  if (!from.has_step) prepare(from);
+  if (!from.finite) {
+    ++rejections.non_finite;
+    return false;
+  }
+  scale_ = draw_scale(options_, rng);
+  const Vector delta = from.step.sample(scale_, rng);
+  if (!delta.allFinite()) {
+    ++rejections.non_finite;
+    return false;
+  }
+  to.coordinates = from.chart.retract(delta);
+  return evaluate(scene_, from, to, rejections);
+}
+
+std::optional<LogDensities> SmallStep::log_densities(ChainState& from, ChainState& to,
+                                                     Rejections& rejections) {
+  prepare(to);
+  if (!to.finite) {
+    ++rejections.non_finite;
+    return std::nullopt;
+  }
+  const auto there = from.chart.inverse(to.coordinates);
+  const auto back = to.chart.inverse(from.coordinates);
+  if (!there || !back) return std::nullopt;
+  // `there->delta` is delta up to rounding; taking it from the coordinates keeps the two densities
+  // on one footing.
+  const double forward = from.step.log_density(there->delta, scale_) + there->log_jacobian;
+  const double reverse = to.step.log_density(back->delta, scale_) + back->log_jacobian;
+  if (!std::isfinite(forward) || !std::isfinite(reverse)) {
+    ++rejections.non_finite;
+    return std::nullopt;
+  }
+  return LogDensities{forward, reverse};
+}
+
+void SmallStep::record(ChainState& from, double acceptance, StepLayers& layers) const {
+  const Vec2d& film = from.contribution.film;
+  if (!from.finite) {
+    layers.add(film, acceptance, nullptr, 0.0);
+    return;
+  }
+  if (!from.figures)
+    from.figures = step_figures(scene_, from.topology, from.chart, options_.derivatives, from.step);
+  layers.add(film, acceptance, &*from.figures, from.step.time_step(scale_));
+}
+
+}  // namespace driftlight

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Laws of energy redistribution. That its images are right is for the slow tests.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "brightness_map.h"
+#include "driftlight/render.h"
+#include "found_path.h"
+#include "remainder.h"
+#include "support/test_scenes.h"
+
+namespace driftlight::test {
+namespace {
+
+/// The value of each path that bidirectional path tracing finds, against f / q of the same path
+/// with coordinates: by the weights of the balance heuristic they are one.
+struct ComparingSink {
+  const Scene& scene;
+  const Remainder& remainder;
+  Vec2d film;
+  int charted = 0;
+  int uncharted = 0;
+  int strategies = 0;  ///< bit s of those with a chart
+  int different = 0;
+
+  void add(const Rgbd& value, const FoundPath& path) { splat(film, value, path); }
+  void splat(const Vec2d& at, const Rgbd& value, const FoundPath& path) {
+    const double y = luminance(value) / path.roulette;
+    if (!(y > 1e-200)) return;
+    const auto sample = state_of(scene, path);
+    if (!sample) {
+      ++uncharted;
+      return;
+    }
+    ++charted;
+    strategies |= 1 << std::min(path.s, 3);
+    const Share share = remainder.share(sample->topology, sample->coordinates,
+                                        contribution(scene, sample->topology, sample->coordinates));
+    EXPECT_NEAR((share.film - at).norm(), 0.0, 1e-6);
+    if (std::abs(share.w * share.brightness / y - 1.0) > 1e-5) ++different;
+  }
+};
+
+TEST(FoundPath, ItsValueIsContributionOverDensity) {
+  const BrightnessMap flat({}, 1.0);
+  for (const TestScene& test : test_scenes()) {
+    SCOPED_TRACE(test.name);
+    const Remainder remainder(test.scene, flat, 1.0);
+    BidirectionalTracer tracer(test.scene, MisHeuristic::Balance, test.max_depth);
+    ComparingSink sink{test.scene, remainder, {}};
+    for (std::uint64_t i = 0; i < 4000; ++i) {
+      Rng rng(1, Stream::Test, i);
+      sink.film = rng.uniform2();
+      tracer.sample(sink.film, rng, sink);
+    }
+    EXPECT_GT(sink.charted, 1000);
+    const bool hits = test.name != "stage";  // its emitters cannot be hit
+    EXPECT_EQ(sink.strategies, hits ? 15 : 14);
+    // A ray that only just passes an edge, or many round mirrors, may be traced anew otherwise.
+    EXPECT_LT(sink.different, 1e-3 * sink.charted);
+    EXPECT_LT(sink.uncharted, 0.3 * sink.charted);
+  }
+}
+
+TEST(BrightnessMap, GivesTheMeanOfAnEvenFilm) {
+  std::vector<FilmValue> found;
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 64; ++x) found.push_back({{(x + 0.5) / 64, (y + 0.5) / 64}, 3.0});
+  const BrightnessMap map(found, 64 * 64);
+  EXPECT_NEAR(map({0.3, 0.8}), 3.0, 1e-12);
+  EXPECT_NEAR(map({0.0, 1.0}), 3.0, 1e-12);
+  EXPECT_NEAR(map.max(), 3.0, 1e-12);
+}
+
+/// A tenth of the mean is left where nothing was found, and one firefly does not show.
+TEST(BrightnessMap, IsPositiveAndCutsFireflies) {
+  std::vector<FilmValue> found;
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 32; ++x) found.push_back({{(x + 0.5) / 64, (y + 0.5) / 64}, 1.0});
+  const BrightnessMap without(found, 64 * 64);
+  EXPECT_NEAR(without({0.95, 0.5}), 0.05, 1e-12);
+  EXPECT_NEAR(without({0.05, 0.5}), 0.95, 1e-12);
+  found.push_back({{0.9, 0.5}, 1e7});
+  EXPECT_LT(BrightnessMap(found, 64 * 64)({0.9, 0.5}), 0.5);
+}
+
+TEST(BrightnessMap, IsOneWithoutLight) {
+  const BrightnessMap map({}, 100);
+  EXPECT_EQ(map({0.5, 0.5}), 1.0);
+}
+
+LangevinResult render_small(const Scene& scene, int threads, double threshold) {
+  LangevinOptions options;
+  options.mode = Mode::Redistribution;
+  options.max_depth = 6;
+  options.redistribution.threshold = threshold;
+  RenderOptions render;
+  render.threads = threads;
+  render.seed = 5;
+  return render_langevin(scene, options, render, 2);
+}
+
+TEST(Redistribution, DoesNotDependOnThreads) {
+  const Scene& scene = test_scenes().front().scene;
+  const LangevinResult one = render_small(scene, 1, 0.1);
+  EXPECT_GT(one.statistics.mutations, 500U);
+  for (const int threads : {2, 4}) {
+    const LangevinResult other = render_small(scene, threads, 0.1);
+    EXPECT_EQ(one.image.rgb, other.image.rgb);
+    EXPECT_EQ(one.statistics.mutations, other.statistics.mutations);
+    EXPECT_EQ(one.statistics.small_step.accepted, other.statistics.small_step.accepted);
+  }
+}
+
+/// What no sample exceeds is carried by the samples alone.
+TEST(Redistribution, LeavesNothingAboveAHighThreshold) {
+  const LangevinResult result = render_small(test_scenes().front().scene, 2, 1e8);
+  EXPECT_EQ(result.statistics.mutations, 0U);
+  EXPECT_EQ(result.statistics.remainder, 0.0);
+  EXPECT_GT(result.statistics.b, 0.0);
+}
+
+}  // namespace
+}  // namespace driftlight::test
