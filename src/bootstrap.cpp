@@ -53,6 +53,11 @@ Bootstrap::Bootstrap(PathSampler& sampler, const Scene& scene, int count, std::u
   }
 }
 
+double Bootstrap::effective_fraction() const {
+  if (!(mean_.sum > 0.0)) return 0.0;
+  return mean_.sum / mean_.sum_of_squares * mean_.mean();
+}
+
 std::vector<PathSampler::Sample> Bootstrap::resample(int chains) const {
   if (!(mean_.sum > 0.0))
     throw InputError("no path from the sensor to an emitter carries light (" +

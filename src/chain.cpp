@@ -9,7 +9,7 @@ Chain::Chain(const Scene& scene, const PathSampler& sampler, const LangevinOptio
              Film& film, const PathSampler::Sample& start, Rng rng, StepLayers* layers)
     : scene_(scene),
       sampler_(sampler),
-      options_(options),
+      large_step_probability_(options.large_step_probability.value_or(0.1)),
       small_step_(scene, options.kernel),
       film_(film),
       rng_(rng),
@@ -21,7 +21,7 @@ Chain::Chain(const Scene& scene, const PathSampler& sampler, const LangevinOptio
 
 void Chain::run(std::uint64_t mutations) {
   for (std::uint64_t i = 0; i < mutations; ++i) {
-    const bool large = rng_.uniform() < options_.large_step_probability;
+    const bool large = rng_.uniform() < large_step_probability_;
     KernelStatistics& kernel = large ? statistics_.large_step : statistics_.small_step;
     const std::optional<double> acceptance = large ? propose_large() : propose_small();
     ++kernel.proposed;

@@ -54,7 +54,9 @@ std::optional<int> light_side(PhaseSpace phase_space, const Scene& scene,
   const bool can_be_hit = is_environment(emitter) || std::holds_alternative<AreaEmitter>(emitter);
   if (lobes.empty() && !can_be_hit) return std::nullopt;
   const bool has_directions = can_be_hit || lobes.back() != Lobe::Delta;
-  if (phase_space == PhaseSpace::Bidirectional && !has_no_light_side(scene, emitter)) {
+  const bool ends_wide = lobes.empty() || lobes.back() == Lobe::Wide;
+  if (phase_space == PhaseSpace::Bidirectional && !ends_wide &&
+      !has_no_light_side(scene, emitter)) {
     const Edges edges(lobes);
     int edge = edges.nearest_to_middle(Lobe::Wide);
     if (edge == 0 && !has_directions) edge = edges.nearest_to_middle(Lobe::Narrow);

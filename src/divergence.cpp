@@ -10,11 +10,12 @@
 namespace driftlight {
 
 Vector divergence(const Scene& scene, const PathTopology& topology, const Chart& chart,
-                  DerivativeMethod method) {
+                  DerivativeMethod method, const Apertures& apertures) {
   constexpr DerivativeRequest kConstraints{.gradient = false, .constraints = true};
   const int d = chart.dimension();
   Linearization path;
   linearize(scene, topology, chart, method, kConstraints, path);
+  constrain(scene, topology, chart, apertures, path);
   Factor factor;
   if (factorise(path, factor) != FactorStatus::Ok)
     return Vector::Constant(d, std::numeric_limits<double>::quiet_NaN());
@@ -34,7 +35,9 @@ Vector divergence(const Scene& scene, const PathTopology& topology, const Chart&
     const double h = 1e-4 * std::min(1.0, 1.0 / (3.0 * std::sqrt(diagonal[j])));
     for (const double step : {h, -h}) {
       delta[j] = step;
-      linearize(scene, topology, chart.displaced(delta), method, kConstraints, path);
+      const Chart displaced = chart.displaced(delta);
+      linearize(scene, topology, displaced, method, kConstraints, path);
+      constrain(scene, topology, displaced, apertures, path);
       sum += apply_constraints(path, column) / (2.0 * step);
     }
     delta[j] = 0.0;

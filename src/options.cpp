@@ -64,6 +64,18 @@ OptionEntry number(std::string_view name, T& field, const Range<T>& range, std::
           }};
 }
 
+/// A number, or none by the word auto.
+OptionEntry number_or_auto(std::string_view name, std::optional<double>& field,
+                           const Range<double>& range, std::string_view help) {
+  const std::string values = "auto or " + describe(range);
+  return {name, values, help, [&field] { return field ? fmt::format("{}", *field) : "auto"; },
+          [&field, name, range, values](const std::string& text) {
+            const std::optional<double> x = parse<double>(text);
+            if (text != "auto" && (!x || !range.contains(*x))) fail(name, text, values);
+            field = x;
+          }};
+}
+
 /// `words[i]` names the enumerator of value i.
 template <class Enum, std::size_t N>
 OptionEntry choice(std::string_view name, Enum& field, const std::array<std::string_view, N>& words,
@@ -109,14 +121,16 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
              "step matrix: the same in all directions, or from the path's constraints"),
       choice("derivatives", kernel.derivatives, kMethods,
              "automatic or hand-derived derivatives; the same to rounding"),
+      choice("aperture", kernel.aperture, std::array<std::string_view, 2>{"off", "on"},
+             "constraints feel the edges of holes and gaps, by probe rays about each segment"),
       number("epsilon", kernel.epsilon, positive, "bound of dt |(a, grad U)|"),
       number("safety", kernel.safety, positive, "divisor of the time step"),
       number("time_step_cap", kernel.time_step_cap, positive, "largest time step"),
       number("scale", kernel.scale, positive, "factor on the step matrix T"),
       number("scale_decades", kernel.scale_decades, Range<double>{0, 10},
              "decades over which each step draws its scale; 0: fixed"),
-      number("large_step_probability", options.large_step_probability, Range<double>{0, 1},
-             "probability of an independent proposal"),
+      number_or_auto("large_step_probability", options.large_step_probability, Range<double>{0, 1},
+                     "probability of an independent proposal; auto: from the bootstrap"),
       choice("large_steps", options.large_steps, std::array<std::string_view, 2>{"path", "bdpt"},
              "where independent proposals come from: the sensor, or both ends"),
       choice("direct", options.direct, std::array<std::string_view, 2>{"chain", "apart"},

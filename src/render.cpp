@@ -166,20 +166,23 @@ class Runner {
 
 /// The chains with what they are started from.
 struct Chains {
+  LangevinOptions options;
   std::optional<PathSampler> sampler;
   RunningMean weights;  ///< f / q of the bootstrap
   std::vector<std::unique_ptr<Chain>> all;
   std::vector<GradientProbe> probes;  ///< of each, if gradients are checked
 
   /// No chains if paths of min_depth edges and more carry no light.
-  Chains(const Scene& scene, const LangevinOptions& options, const RenderOptions& render,
-         int min_depth, Film& film) {
+  Chains(const Scene& scene, const LangevinOptions& given, const RenderOptions& render,
+         int min_depth, Film& film)
+      : options(given) {
     if (min_depth > options.max_depth) return;
-    sampler.emplace(scene, options.max_depth, options.large_steps, min_depth,
-                    options.phase_space);
+    sampler.emplace(scene, options.max_depth, options.large_steps, min_depth, options.phase_space);
     const Bootstrap bootstrap(*sampler, scene, options.bootstrap, render.seed);
     weights = bootstrap.weights();
     if (!(weights.sum > 0.0)) return;
+    if (!options.large_step_probability)
+      options.large_step_probability = std::clamp(bootstrap.effective_fraction(), 0.1, 0.9);
     for (const PathSampler::Sample& start : bootstrap.resample(options.chains)) {
       const auto index = static_cast<std::uint64_t>(all.size());
       all.push_back(std::make_unique<Chain>(scene, *sampler, options, film, start,
@@ -206,6 +209,7 @@ struct Chains {
       sum += chain->statistics();
       weights += chain->weights();
     }
+    sum.large_step_probability = options.large_step_probability.value_or(0.0);
     sum.b = weights.mean();
     sum.b_error = all.empty() ? 0.0 : weights.error();
     return sum;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "driftlight/aperture.h"
 #include "driftlight/divergence.h"
 
 namespace driftlight {
@@ -54,9 +55,14 @@ void prepare_step(const Scene& scene, const KernelOptions& options, ChainState& 
   state.figures.reset();
   Linearization path;
   linearize(scene, state.topology, state.chart, options.derivatives, request, path);
+  Apertures apertures;
+  if (options.aperture && request.constraints) {
+    apertures = find_apertures(scene, state.topology, state.coordinates);
+    constrain(scene, state.topology, state.chart, apertures, path);
+  }
   std::optional<Vector> div;
   if (options.drift == Drift::Full && request.constraints) {
-    div = divergence(scene, state.topology, state.chart, options.derivatives);
+    div = divergence(scene, state.topology, state.chart, options.derivatives, apertures);
     if (!div->allFinite()) div.reset();
   }
   state.finite = state.step.assign(options, path, div ? &*div : nullptr);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Whole images: the Langevin sampler against path tracing, both against closed forms and against
+/// Whole images: bidirectional and light tracing against path tracing, closed forms, and images of
 /// an independent renderer.
 #include <gtest/gtest.h>
 
@@ -17,267 +17,16 @@
 #include "driftlight/scene_file.h"
 #include "support/t_test.h"
 #include "support/test_scenes.h"
+#include "support/tiles.h"
 
 namespace driftlight {
 namespace {
 
-constexpr int kRuns = 20;
-constexpr int kTile = 8;
-
-LoadedScene load_small(const std::string& name,
-                       const std::map<std::string, std::string>& defines = {}) {
-  LoadOptions options;
-  options.defines = {{"width", "32"}, {"height", "24"}};
-  options.defines.insert(defines.begin(), defines.end());
-  return load_scene(std::filesystem::path(DRIFTLIGHT_SCENE_DIR) / (name + ".xml"), options);
-}
-
-/// Mean luminance of each tile of kTile x kTile pixels.
-std::vector<double> tile_means(const Image& image) {
-  std::vector<double> means;
-  for (int top = 0; top + kTile <= image.height; top += kTile)
-    for (int left = 0; left + kTile <= image.width; left += kTile) {
-      double sum = 0;
-      for (int y = top; y < top + kTile; ++y)
-        for (int x = left; x < left + kTile; ++x) {
-          const float* p = image.pixel(x, y);
-          sum += luminance(Rgbd(static_cast<double>(p[0]), static_cast<double>(p[1]),
-                                static_cast<double>(p[2])));
-        }
-      means.push_back(sum / (kTile * kTile));
-    }
-  return means;
-}
-
-/// Tile means over independent runs; render(seed) is one run.
-template <class Render>
-std::vector<test::Moments> tiles_over_runs(const Render& render) {
-  std::vector<test::Moments> tiles;
-  for (int run = 0; run < kRuns; ++run) {
-    const std::vector<double> means = tile_means(render(static_cast<std::uint64_t>(run)));
-    tiles.resize(means.size());
-    for (std::size_t i = 0; i < means.size(); ++i) tiles[i].add(means[i]);
-  }
-  return tiles;
-}
+using test::limelight;
+using test::load_small;
+using test::tiles_over_runs;
 
 double median(const std::vector<double>& sorted) { return sorted[sorted.size() / 2]; }
-
-/// How much to render of a scene, and how well its tiles are then known.
-struct Work {
-  const char* scene;
-  int samples_per_pixel;
-  double mutations_per_pixel;
-  int bootstrap;
-  /// Bound on the median over tiles of the standard error of langevin - path, relative: a test that
-  /// cannot see a bias of three times this much would prove nothing.
-  double resolution;
-  double large_step_probability = 0.2;
-  /// An island of light that one strategy alone finds, and hardly ever: the brightness that chains
-  /// give it is right on average, but so skewed that a t-test over 20 runs does not see it.
-  bool rare_direct_island = false;
-};
-
-void PrintTo(const Work& work, std::ostream* out) { *out << work.scene; }
-
-struct Configuration {
-  const char* name;
-  Drift drift;
-  LargeSteps large_steps = LargeSteps::Bdpt;
-  DirectLight direct = DirectLight::Apart;
-  PhaseSpace phase_space = PhaseSpace::Directions;
-};
-
-/// Rough metal and white balls under a spot and parallel light.
-Scene limelight() {
-  SceneBuilder builder;
-  const auto material = [&](Bsdf bsdf) {
-    return builder.add_material({builder.add_bsdf(std::move(bsdf)), std::nullopt});
-  };
-  const auto white = material(Diffuse{Texture(Rgbd{0.7, 0.6, 0.5})});
-  builder.add_shape(test::quad({-2, 0, 2}, {4, 0, 0}, {0, 0, -4}), white);
-  builder.add_shape(test::quad({-2, 0, -1.5}, {4, 0, 0}, {0, 3, 0}), white);
-  const Microfacets rough{Distribution::Ggx, 0.4};
-  builder.add_shape(
-      test::round_mesh({-0.5, 0.6, 0.2}, 0.5, 8),
-      material(RoughConductor{rough, {0.2, 0.9, 1.1}, {3.9, 2.4, 2.2}, Texture(Rgbd{1, 1, 1})}));
-  builder.add_shape(test::round_mesh({0.6, 0.5, 0.0}, 0.45, 5), white);
-  builder.add_emitter(SpotEmitter({1.5, 2.5, 1.0}, {-1.6, -2.1, -0.9}, {20, 18, 15}, 0.6, 0.1));
-  builder.add_emitter(DirectionalEmitter{Vec3d(0.6, -1.0, -0.7).normalized(), {0.5, 0.8, 1.0}});
-  PerspectiveCamera camera = test::look_at({0.2, 1.6, 3.0}, {0, 0.6, 0}, 0.5);
-  camera.half_height = 0.375;
-  camera.film_width = 32;
-  camera.film_height = 24;
-  builder.set_camera(camera);
-  return builder.build();
-}
-
-/// The ring is made so rough that path tracing hits the light's reflection often: else its rare
-/// hits would make means that are not normal.
-LoadedScene load_scene_of(const Work& work) {
-  const std::string name = work.scene;
-  if (name == "limelight") return {limelight(), 5, {}};
-  if (name == "ring_caustic") return load_small(name, {{"alpha", "0.2"}});
-  return load_small(name);
-}
-
-/// Path-traced tiles of a scene, rendered once for all configurations.
-const std::vector<test::Moments>& traced_tiles(const Work& work) {
-  static std::map<std::string, std::vector<test::Moments>> known;
-  auto& tiles = known[work.scene];
-  if (tiles.empty()) {
-    const LoadedScene loaded = load_scene_of(work);
-    tiles = tiles_over_runs([&](std::uint64_t seed) {
-      RenderOptions render;
-      render.seed = 1000 + seed;
-      return render_path(loaded.scene, PathOptions{loaded.max_depth.value()}, render,
-                         work.samples_per_pixel)
-          .image;
-    });
-  }
-  return tiles;
-}
-
-class LangevinEqualsPath : public testing::TestWithParam<Work> {};
-
-/// The means of independent images agree tile by tile: Welch's test, Sidak-corrected at 1 %, for
-/// steps without drift, with the gradient, and with the divergence, large steps from the sensor and
-/// from both ends, direct light apart or by the chains, coordinates from one end or both. All use
-/// the constraint matrix.
-TEST_P(LangevinEqualsPath, TileMeans) {
-  const Work& work = GetParam();
-  const LoadedScene loaded = load_scene_of(work);
-  const std::vector<test::Moments>& traced = traced_tiles(work);
-  for (const Configuration& configuration :
-       {Configuration{"brownian", Drift::None}, Configuration{"gradient", Drift::Gradient},
-        Configuration{"divergence", Drift::Full},
-        Configuration{"from the sensor", Drift::Gradient, LargeSteps::Path, DirectLight::Chain},
-        Configuration{"chains alone", Drift::None, LargeSteps::Bdpt, DirectLight::Chain},
-        Configuration{"both ends", Drift::Gradient, LargeSteps::Bdpt, DirectLight::Apart,
-                      PhaseSpace::Bidirectional}}) {
-    if (work.rare_direct_island && configuration.direct == DirectLight::Chain) continue;
-    LangevinOptions options;
-    options.mode = Mode::Chain;
-    options.large_step_probability = work.large_step_probability;
-    options.large_steps = configuration.large_steps;
-    options.direct = configuration.direct;
-    options.max_depth = loaded.max_depth.value();
-    options.kernel.drift = configuration.drift;
-    options.phase_space = configuration.phase_space;
-    options.bootstrap = work.bootstrap;
-    const auto sampled = tiles_over_runs([&](std::uint64_t seed) {
-      RenderOptions render;
-      render.seed = seed;
-      return render_langevin(loaded.scene, options, render, work.mutations_per_pixel).image;
-    });
-    const double level = test::sidak(0.01, static_cast<int>(sampled.size()));
-    std::vector<double> errors;
-    for (std::size_t i = 0; i < sampled.size(); ++i) {
-      errors.push_back(std::hypot(sampled[i].error(), traced[i].error()) / traced[i].mean());
-      EXPECT_GT(test::welch_p_value(sampled[i], traced[i]), level)
-          << configuration.name << ", tile " << i << ": langevin " << sampled[i].mean() << " +- "
-          << sampled[i].error() << ", path " << traced[i].mean() << " +- " << traced[i].error();
-    }
-    std::sort(errors.begin(), errors.end());
-    EXPECT_LT(median(errors), work.resolution) << configuration.name;
-    RecordProperty(std::string("error_") + configuration.name, std::to_string(median(errors)));
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    Scenes, LangevinEqualsPath,
-    testing::Values(Work{"furnace_sphere", 64, 200, 50000, 0.01},
-                    Work{"cornell_glossy", 300, 300, 100000, 0.04},
-                    // The lamp's reflection in the glass is the rare island. Large steps are
-                    // frequent, as small ones hardly leave the ball's silhouette.
-                    Work{"glass_caustic", 1200, 400, 1000000, 0.05, 0.5, true},
-                    Work{"small_hole", 400, 400, 200000, 0.08},
-                    Work{"glossy_chain", 600, 300, 400000, 0.12},
-                    Work{"door_ajar", 200, 150, 200000, 0.12},
-                    Work{"ring_caustic", 300, 200, 200000, 0.04},
-                    Work{"limelight", 256, 200, 100000, 0.02}),
-    [](const auto& instance) { return std::string(instance.param.scene); });
-
-class RedistributionEqualsPath : public testing::TestWithParam<Work> {};
-
-struct Sharing {
-  const char* name;
-  RedistributionOptions redistribution;
-  Drift drift;
-};
-
-/// The same for energy redistribution, whatever the threshold and the length of its chains.
-TEST_P(RedistributionEqualsPath, TileMeans) {
-  const Work& work = GetParam();
-  const LoadedScene loaded = load_scene_of(work);
-  const std::vector<test::Moments>& traced = traced_tiles(work);
-  for (const Sharing& sharing : {Sharing{"default", {}, Drift::Gradient},
-                                 Sharing{"short chains", {0.2, 7, 6}, Drift::None}}) {
-    LangevinOptions options;
-    options.max_depth = loaded.max_depth.value();
-    options.redistribution = sharing.redistribution;
-    options.kernel.drift = sharing.drift;
-    const auto sampled = tiles_over_runs([&](std::uint64_t seed) {
-      RenderOptions render;
-      render.seed = seed;
-      return render_langevin(loaded.scene, options, render, 40).image;
-    });
-    const double level = test::sidak(0.01, static_cast<int>(sampled.size()));
-    std::vector<double> errors;
-    for (std::size_t i = 0; i < sampled.size(); ++i) {
-      errors.push_back(std::hypot(sampled[i].error(), traced[i].error()) / traced[i].mean());
-      EXPECT_GT(test::welch_p_value(sampled[i], traced[i]), level)
-          << sharing.name << ", tile " << i << ": langevin " << sampled[i].mean() << " +- "
-          << sampled[i].error() << ", path " << traced[i].mean() << " +- " << traced[i].error();
-    }
-    std::sort(errors.begin(), errors.end());
-    EXPECT_LT(median(errors), work.resolution) << sharing.name;
-    RecordProperty(std::string("error_") + sharing.name, std::to_string(median(errors)));
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    Scenes, RedistributionEqualsPath,
-    testing::Values(Work{"furnace_sphere", 64, 0, 0, 0.01}, Work{"cornell_glossy", 300, 0, 0, 0.04},
-                    Work{"glass_caustic", 1200, 0, 0, 0.05}, Work{"small_hole", 400, 0, 0, 0.08},
-                    Work{"glossy_chain", 600, 0, 0, 0.12}, Work{"door_ajar", 200, 0, 0, 0.12},
-                    Work{"ring_caustic", 300, 0, 0, 0.04}, Work{"limelight", 256, 0, 0, 0.02}),
-    [](const auto& instance) { return std::string(instance.param.scene); });
-
-/// A point behind glass and mirrors: path tracing finds nothing, and paths have coordinates from
-/// both ends only. Against bidirectional path tracing, without drift and with all of it.
-TEST(LangevinEqualsBdpt, PointCaustic) {
-  const LoadedScene loaded = load_small("point_caustic");
-  const int depth = loaded.max_depth.value();
-  const auto traced = tiles_over_runs([&](std::uint64_t seed) {
-    RenderOptions render;
-    render.seed = 1000 + seed;
-    return render_bdpt(loaded.scene, BdptOptions{depth}, render, 300).image;
-  });
-  const double level = test::sidak(0.01, static_cast<int>(traced.size()));
-  for (const Drift drift : {Drift::None, Drift::Full}) {
-    LangevinOptions options;
-    options.mode = Mode::Chain;
-    options.phase_space = PhaseSpace::Bidirectional;
-    options.kernel.drift = drift;
-    options.max_depth = depth;
-    options.bootstrap = 200000;
-    const auto sampled = tiles_over_runs([&](std::uint64_t seed) {
-      RenderOptions render;
-      render.seed = seed;
-      return render_langevin(loaded.scene, options, render, 300).image;
-    });
-    std::vector<double> errors;
-    for (std::size_t i = 0; i < sampled.size(); ++i) {
-      errors.push_back(std::hypot(sampled[i].error(), traced[i].error()) / traced[i].mean());
-      EXPECT_GT(test::welch_p_value(sampled[i], traced[i]), level)
-          << "tile " << i << ": langevin " << sampled[i].mean() << " +- " << sampled[i].error()
-          << ", bdpt " << traced[i].mean() << " +- " << traced[i].error();
-    }
-    std::sort(errors.begin(), errors.end());
-    EXPECT_LT(median(errors), 0.03);
-  }
-}
 
 /// Rough glass and rough metal with coarse interpolated normals on a floor with bent ones, under a
 /// sky with a small sun: shading normals and refraction from both ends, and no smooth surface.
@@ -311,7 +60,7 @@ struct BidirectionalWork {
   int path_samples;  ///< per pixel and run
   int bdpt_samples;
   int light_samples;  ///< 0: smooth surfaces hide light from light tracing
-  double resolution;  ///< as in Work
+  double resolution;  ///< of expect_equal_tiles
 };
 
 void PrintTo(const BidirectionalWork& work, std::ostream* out) { *out << work.scene; }
@@ -344,17 +93,7 @@ TEST_P(BidirectionalEqualsPath, TileMeans) {
     return render_path(loaded.scene, {depth}, render, work.path_samples);
   });
   const auto compare = [&](const std::string& name, const std::vector<test::Moments>& sampled) {
-    const double level = test::sidak(0.01, static_cast<int>(sampled.size()));
-    std::vector<double> errors;
-    for (std::size_t i = 0; i < sampled.size(); ++i) {
-      errors.push_back(std::hypot(sampled[i].error(), traced[i].error()) / traced[i].mean());
-      EXPECT_GT(test::welch_p_value(sampled[i], traced[i]), level)
-          << name << ", tile " << i << ": " << sampled[i].mean() << " +- " << sampled[i].error()
-          << ", path " << traced[i].mean() << " +- " << traced[i].error();
-    }
-    std::sort(errors.begin(), errors.end());
-    EXPECT_LT(median(errors), work.resolution) << name;
-    RecordProperty("error_" + name, std::to_string(median(errors)));
+    test::expect_equal_tiles(name, sampled, traced, work.resolution);
   };
   for (const MisHeuristic heuristic : {MisHeuristic::Balance, MisHeuristic::Power}) {
     const bool power = heuristic == MisHeuristic::Power;

@@ -61,11 +61,16 @@ TEST(Options, SetReachesTheFields) {
   EXPECT_EQ(options.kernel.preconditioner, PreconditionerKind::Identity);
   set_option(list, "preconditioner", "constraints");
   EXPECT_EQ(options.kernel.preconditioner, PreconditionerKind::Constraints);
+  set_option(list, "aperture", "on");
+  EXPECT_TRUE(options.kernel.aperture);
+  set_option(list, "aperture", "off");
+  EXPECT_FALSE(options.kernel.aperture);
   set_option(list, "epsilon", "0.25");
   set_option(list, "safety", "10");
   set_option(list, "time_step_cap", "1e-2");
   set_option(list, "scale", ".5");
   set_option(list, "scale_decades", "2");
+  EXPECT_EQ(find(list, "large_step_probability").get(), "auto");
   set_option(list, "large_step_probability", "0");
   set_option(list, "chains", "7");
   set_option(list, "bootstrap", "1000");
@@ -107,11 +112,11 @@ INSTANTIATE_TEST_SUITE_P(
     Options, BadOption,
     ::testing::Values(
         BadValue{"drift", "sideways"}, BadValue{"drift", ""}, BadValue{"drift", "Full"},
-        BadValue{"preconditioner", "hessian"}, BadValue{"epsilon", "0"}, BadValue{"epsilon", "-1"},
-        BadValue{"epsilon", "nan"}, BadValue{"epsilon", "inf"}, BadValue{"epsilon", "0.1x"},
-        BadValue{"epsilon", " 0.1"}, BadValue{"epsilon", ""}, BadValue{"epsilon", "1e999"},
-        BadValue{"safety", "0"}, BadValue{"time_step_cap", "0"}, BadValue{"scale", "-0.5"},
-        BadValue{"scale_decades", "-1"}, BadValue{"scale_decades", "11"},
+        BadValue{"preconditioner", "hessian"}, BadValue{"aperture", "1"}, BadValue{"epsilon", "0"},
+        BadValue{"epsilon", "-1"}, BadValue{"epsilon", "nan"}, BadValue{"epsilon", "inf"},
+        BadValue{"epsilon", "0.1x"}, BadValue{"epsilon", " 0.1"}, BadValue{"epsilon", ""},
+        BadValue{"epsilon", "1e999"}, BadValue{"safety", "0"}, BadValue{"time_step_cap", "0"},
+        BadValue{"scale", "-0.5"}, BadValue{"scale_decades", "-1"}, BadValue{"scale_decades", "11"},
         BadValue{"large_step_probability", "1.01"}, BadValue{"large_step_probability", "-0.01"},
         BadValue{"chains", "0"}, BadValue{"chains", "1.5"}, BadValue{"chains", "1e3"},
         BadValue{"bootstrap", "0"}, BadValue{"bootstrap", "99999999999999"},

@@ -18,6 +18,8 @@ class Bootstrap {
   Bootstrap(PathSampler& sampler, const Scene& scene, int count, std::uint64_t seed);
 
   const RunningMean& weights() const { return mean_; }
+  /// n_eff / n = E[w]^2 / E[w^2]: what an independent sample is worth of one of f itself.
+  double effective_fraction() const;
   /// `chains` paths drawn in proportion to their weight, by systematic resampling.
   /// Throws InputError if no sample carries light.
   std::vector<PathSampler::Sample> resample(int chains) const;

@@ -13,7 +13,8 @@ namespace driftlight {
 
 class Chain {
  public:
-  /// Starts at a path that carries light. Small steps are recorded in `layers` unless it is null.
+  /// Starts at a path that carries light. The options must outlive it; an automatic probability of
+  /// large steps is 0.1. Small steps are recorded in `layers` unless it is null.
   Chain(const Scene& scene, const PathSampler& sampler, const LangevinOptions& options, Film& film,
         const PathSampler::Sample& start, Rng rng, StepLayers* layers = nullptr);
 
@@ -41,7 +42,7 @@ class Chain {
 
   const Scene& scene_;
   const PathSampler& sampler_;
-  const LangevinOptions& options_;
+  double large_step_probability_;
   SmallStep small_step_;
   Film& film_;
   Rng rng_;

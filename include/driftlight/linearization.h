@@ -40,8 +40,8 @@ inline constexpr LocalColumns kSensorColumns{.xi = 0, .omega = 2, .u = 4};
 inline constexpr LocalColumns kLightColumns{.xi = 4, .omega = 6, .u = 0};
 
 /// Most residuals of a path: two of the film, three of each position, six of each scattering (two
-/// lobes), three of the environment or of a spot.
-inline constexpr int kMaxResiduals = 2 + 9 * kMaxPathLength + 3;
+/// lobes), three of the environment or of a spot, two of the aperture of each segment.
+inline constexpr int kMaxResiduals = 2 + 9 * kMaxPathLength + 3 + 2 * kMaxPathLength;
 
 /// The sensor (stage 0), a scattering vertex, or the end of a path that hits an emitter or leaves
 /// the scene; of the light side the emitter (a point there, then emission) or a scattering vertex.
@@ -71,7 +71,7 @@ struct Linearization {
   int sensor_stages = 0;  ///< with a light side: those before it
   std::array<Stage, kMaxPathLength + 2> stages;
   /// Rows sqrt(w)/3 dr / d(xi, omega, u) of all residuals r with precision w, in the order of
-  /// ConstraintVisitor.
+  /// ConstraintVisitor; behind them in each stage those of apertures (aperture.h).
   Eigen::Array<double, kMaxResiduals, kLocalWidth, Eigen::RowMajor> rows;
 
   int rows_begin(int stage) const {

@@ -35,6 +35,8 @@ struct KernelOptions {
   Drift drift = Drift::Gradient;
   PreconditionerKind preconditioner = PreconditionerKind::Constraints;
   DerivativeMethod derivatives = DerivativeMethod::Hand;
+  /// Constraints include the free width about each segment, found by probe rays (aperture.h).
+  bool aperture = false;
   /// Of (E63.8): dt |(a, grad U)| <= epsilon.
   double epsilon = 10;
   /// dt is divided by it.
@@ -82,8 +84,11 @@ struct LangevinOptions {
   Mode mode = Mode::Redistribution;
   KernelOptions kernel;
   RedistributionOptions redistribution;
-  PhaseSpace phase_space = PhaseSpace::Directions;
-  double large_step_probability = 0.2;
+  PhaseSpace phase_space = PhaseSpace::Bidirectional;
+  /// None: the fraction n_eff / n = E[w]^2 / E[w^2] of the bootstrap's samples that independent
+  /// samples of f would be worth, within [0.1, 0.9]. Where it is high large steps alone do; where
+  /// it is low more of them cost time and change little. Fixed before the chains start.
+  std::optional<double> large_step_probability;
   LargeSteps large_steps = LargeSteps::Bdpt;
   DirectLight direct = DirectLight::Apart;
   /// Independent chains, whatever the number of threads.

@@ -68,6 +68,7 @@ struct KernelStatistics {
 struct LangevinStatistics {
   KernelStatistics large_step;
   KernelStatistics small_step;
+  double large_step_probability = 0;  ///< that was used
   Rejections rejections;
   /// Mutations spent at paths of n edges.
   std::array<std::uint64_t, kMaxPathLength + 1> path_length{};

@@ -90,6 +90,7 @@ void report_chains(const LangevinStatistics& s, const Image& image, Report& repo
   const double rate = per_second(mutations, s.render_seconds - s.direct_seconds);
   report.statistics.update(
       {{"b_error", s.b_error},
+       {"large_step_probability", s.large_step_probability},
        {"direct", {{"mean", s.direct_mean}, {"samples_per_pixel", s.direct_samples_per_pixel}}},
        {"mutations_per_second", rate},
        {"path_lengths", s.path_length}});
