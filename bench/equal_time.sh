@@ -42,8 +42,9 @@ errors() {
 median() { sort -g | sed -n "$(((runs + 1) / 2))p"; }
 
 mkdir -p "$references"
-echo "| scene | ${names[*]} |" | sed 's/ \([a-z]\)/ | \1/2g'
-echo "|---|---|---|---|---|"
+printf '| scene |'
+printf ' %s |' "${names[@]}"
+printf '\n| --- | ---: | ---: | ---: | ---: |\n'
 for scene in "$@"; do
   name=$(basename "$scene" .xml)
   [[ $name == scene ]] && name=$(basename "$(dirname "$scene")")

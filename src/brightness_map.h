@@ -28,8 +28,11 @@ class BrightnessMap {
  private:
   static constexpr int kCells = 16;  ///< on a side
 
-  double& cell(int x, int y) { return cells_[static_cast<std::size_t>(y * kCells + x)]; }
-  double cell(int x, int y) const { return cells_[static_cast<std::size_t>(y * kCells + x)]; }
+  static std::size_t index(int x, int y) {
+    return static_cast<std::size_t>(y) * kCells + static_cast<std::size_t>(x);
+  }
+  double& cell(int x, int y) { return cells_[index(x, y)]; }
+  double cell(int x, int y) const { return cells_[index(x, y)]; }
 
   std::vector<double> cells_;
 };

@@ -28,9 +28,10 @@ namespace driftlight {
 
 /// Of one segment: the precision of r is P = row_0 row_0^T + row_1 row_1^T, across v.
 struct Aperture {
-  int segment = 0;     ///< 0 leaves the sensor
-  double kappa = 0;    ///< 1 / distance from the start of the segment
-  Vec3d rows[2] = {};  ///< per unit slope; the second is zero for a slit
+  int segment = 0;   ///< 0 leaves the sensor
+  double kappa = 0;  ///< 1 / distance from the start of the segment
+  /// Per unit slope; the second is zero for a slit.
+  std::array<Vec3d, 2> rows{Vec3d::Zero(), Vec3d::Zero()};
 };
 
 class Apertures {

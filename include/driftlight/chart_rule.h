@@ -20,8 +20,9 @@ enum class Lobe : std::uint8_t {
 
 Lobe lobe_of(const Bsdf& bsdf);
 
-/// Vertices on the light side of a path through these lobes, in order from the sensor, to this
-/// emitter; 0: it has the chart of PhaseSpace::Directions, if any. None if it has no chart.
+/// Vertices on the light side of a path through these lobes, in order from the sensor, to the
+/// emitter of this index; 0: it has the chart of PhaseSpace::Directions, if any. None if it has no
+/// chart.
 ///
 /// With PhaseSpace::Directions always 0, but none for a point, spot or directional emitter behind a
 /// delta lobe. With PhaseSpace::Bidirectional it is 0 if the last lobe is wide: there the
@@ -32,6 +33,6 @@ Lobe lobe_of(const Bsdf& bsdf);
 /// nearest to the middle between any two ends that are not delta. Always 0 for environments and for
 /// emitters whose points have no chart (meshes that are not planar).
 std::optional<int> light_side(PhaseSpace phase_space, const Scene& scene,
-                              std::span<const Lobe> lobes, std::uint32_t emitter);
+                              std::span<const Lobe> lobes, std::uint32_t index);
 
 }  // namespace driftlight

@@ -99,7 +99,7 @@ struct Recorder : WalkVisitor<double> {
   void directional_emission(const DirectionalEmitter& emitter, const Vec3d&) {
     color *= emitter.irradiance;
   }
-  void vertex(int k) { index = k; }
+  void vertex(int k) { index_ = k; }
   /// f has its cosines the other way round.
   void light_scatter(const ScatterEvent<double>& e) {
     Vertex& x = add_light(e, false);
@@ -122,9 +122,9 @@ struct Recorder : WalkVisitor<double> {
     return spot != nullptr ? spot->intensity() : std::get<PointEmitter>(emitter).intensity;
   }
   Vertex& add_light(const ScatterEvent<double>& e, bool is_delta) {
-    const bool first = index + 1 == topology.scatter_count;
-    const Vec3d& from = first ? start : vertices[static_cast<std::size_t>(index) + 1].p;
-    return add({e.bsdf, e.shape, e.at, e.wo, e.wi, e.scattering}, index, from, is_delta);
+    const bool first = index_ + 1 == topology.scatter_count;
+    const Vec3d& from = first ? start : vertices[static_cast<std::size_t>(index_) + 1].p;
+    return add({e.bsdf, e.shape, e.at, e.wo, e.wi, e.scattering}, index_, from, is_delta);
   }
   Vertex& add(const ScatterEvent<double>& e, int k, const Vec3d& from, bool is_delta) {
     const auto primitive = topology.vertices[static_cast<std::size_t>(k)].hit.primitive;
@@ -154,7 +154,7 @@ struct Recorder : WalkVisitor<double> {
     return x;
   }
 
-  int index = 0;
+  int index_ = 0;
 };
 
 /// What both sweeps know of a recorded path.
