@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <mutex>
 #include <vector>
 
+#include "driftlight/error.h"
 #include "driftlight/film.h"
 #include "exact_sum.h"
 #include "found_path.h"
@@ -28,7 +28,7 @@ constexpr double kMostStretch = 16;
 /// mutations no longer pay.
 constexpr double kLeastDeposit = 0.2;
 
-/// Collects the unweighted luminances w m of what is found.
+/// Collects the luminances of what is found.
 class PilotSink {
  public:
   PilotSink(const Vec2d& film, std::vector<FilmValue>& found) : film_(film), found_(found) {}
@@ -203,10 +203,12 @@ LangevinResult render_redistribution(const Scene& scene, const LangevinOptions& 
   const Stopwatch watch;
   Redistribution common(scene, options, render);
   const double pilot_seconds = watch.seconds();
+  RenderOptions after_pilot = render;
+  if (render.time) after_pilot.time = std::max(1e-3, *render.time - pilot_seconds);
   SampleFilm film(scene.camera(), render.seed, 0);
   const RedistributionSampler sampler(common);
   const PathResult samples =
-      run_passes(render, static_cast<int>(samples_per_pixel), [&](std::uint64_t index) {
+      run_passes(after_pilot, static_cast<int>(samples_per_pixel), [&](std::uint64_t index) {
         film.pass(index, sampler);
         common.set_deposit(static_cast<double>(index + 1) * scene.camera().pixel_count());
       });
@@ -217,6 +219,8 @@ LangevinResult render_redistribution(const Scene& scene, const LangevinOptions& 
   const Image chains = common.film.develop(common.unit / std::max(1.0, samples.samples_per_pixel));
   for (std::size_t i = 0; i < chains.rgb.size(); ++i) result.image.rgb[i] += chains.rgb[i];
   result.statistics.b = mean_luminance(result.image);
+  if (!(result.statistics.b > 0.0) && !samples.stopped)
+    throw InputError("no path from the sensor to an emitter carries light");
   result.statistics.remainder = mean_luminance(chains);
   result.statistics.samples_per_pixel = samples.samples_per_pixel;
   result.statistics.stopped = samples.stopped;
