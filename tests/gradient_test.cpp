@@ -183,13 +183,18 @@ TEST(Constraints, JacobiansEqualRiddersDifferences) {
 
       for (int j = 0; j < d; ++j) {
         const double width = std::min(1.0, 1.0 / (3.0 * std::sqrt(q(j, j))));
-        for (std::size_t i = 0; i < rows.residuals.size(); ++i) {
-          const auto f = [&](double x) {
-            std::vector<double> delta(static_cast<std::size_t>(d));
-            delta[static_cast<std::size_t>(j)] = x;
-            return residuals_at<double>(test.scene, path, p.chart, delta).residuals[i];
-          };
-          const Derivative expected = ridders(f, 0.05 * width);
+        const auto residuals = [&](double x) {
+          std::vector<double> delta(static_cast<std::size_t>(d));
+          delta[static_cast<std::size_t>(j)] = x;
+          return residuals_at<double>(test.scene, path, p.chart, delta).residuals;
+        };
+        // Far off a lobe may vanish, and its residuals with it.
+        const std::size_t count = rows.residuals.size();
+        double step = 0.05 * width;
+        while (residuals(step).size() != count || residuals(-step).size() != count) step *= 0.25;
+        for (std::size_t i = 0; i < count; ++i) {
+          const auto f = [&](double x) { return residuals(x).at(i); };
+          const Derivative expected = ridders(f, step);
           // In units of the residual's sigma per width of the coordinate.
           const double sigma = 1.0 / std::sqrt(std::max(rows.precisions[i], 1e-6));
           EXPECT_NEAR(rows.residuals[i].v[j], expected.value,
