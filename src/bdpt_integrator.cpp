@@ -44,8 +44,8 @@ class StrategySink {
 
 class BdptSampler {
  public:
-  BdptSampler(const Scene& scene, const BdptOptions& options)
-      : tracer_(scene, options.heuristic, options.max_depth) {}
+  BdptSampler(const Scene& scene, const EmissionGuide& guide, const BdptOptions& options)
+      : tracer_(scene, guide, options.heuristic, options.max_depth) {}
 
   void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& film_sink) {
     StrategySink sink(film_sink);
@@ -61,7 +61,8 @@ class BdptSampler {
 PathResult render_bdpt(const Scene& scene, const BdptOptions& options, const RenderOptions& render,
                        int samples_per_pixel) {
   options.validate();
-  const BdptSampler sampler(scene, options);
+  const EmissionGuide unguided(scene);
+  const BdptSampler sampler(scene, unguided, options);
   std::vector<std::string> names;
   if (render.strategies != nullptr) names = strategy_names(options.max_depth);
   SampleFilm film(scene.camera(), render.seed, static_cast<int>(names.size()));

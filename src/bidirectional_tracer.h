@@ -28,10 +28,13 @@ struct FoundPath {
 /// Values are weighted by strategy_weights.h.
 class BidirectionalTracer {
  public:
-  BidirectionalTracer(const Scene& scene, MisHeuristic heuristic, int max_depth)
+  /// Light subpaths begin as the guide says, which must outlive it.
+  BidirectionalTracer(const Scene& scene, const EmissionGuide& guide, MisHeuristic heuristic,
+                      int max_depth)
       : scene_(scene),
-        tracer_(scene, heuristic),
-        weights_(scene, heuristic),
+        guide_(guide),
+        tracer_(scene, guide, heuristic),
+        weights_(guide, heuristic),
         max_depth_(max_depth) {}
 
   template <class Sink>
@@ -53,12 +56,14 @@ class BidirectionalTracer {
       if (!from_light_[s - 2].delta) connect_to_sensor(from_light_[s - 2], s, sink);
   }
 
+  /// The first ray of the light subpath of the last sample.
+  const Emission& emission() const { return emission_; }
+
  private:
   void trace_from_light(Rng& rng) {
-    end_ = sample_light_end(scene_, rng);
-    const Emission emission = sample_emission(scene_, end_, rng);
-    tracer_.trace(Walk::FromLight, tracer_.leave_light(end_, emission),
-                  RayFollower(scene_, emission.origin, emission.start, emission.direction),
+    emission_ = guide_.sample(rng);
+    tracer_.trace(Walk::FromLight, tracer_.leave_light(emission_),
+                  RayFollower(scene_, emission_.origin, emission_.start, emission_.direction),
                   max_depth_ - 1, rng, from_light_);
   }
 
@@ -66,7 +71,8 @@ class BidirectionalTracer {
   void hit_area(const SubpathVertex& z, int t, Sink& sink) const {
     const auto end = light_end_at(scene_, z.surface);
     if (!end) return;
-    const double w = weights_.hit(z, t, *end, end->n.dot(z.surface.wi));
+    const Vec3d& v = z.surface.wi;
+    const double w = weights_.hit(z, t, *end, end->p, v, end->n.dot(v));
     sink.add(w * z.throughput * end->emitted, path(0, t, *end, z.roulette));
   }
 
@@ -75,7 +81,8 @@ class BidirectionalTracer {
     const auto end = light_end_toward(scene_, escape.direction);
     if (!end) return;
     const int t = from_sensor_.size() + 2;
-    const double w = weights_.hit(tracer_.arrive_at_infinity(escape), t, *end, 1.0);
+    const double w =
+        weights_.hit(tracer_.arrive_at_infinity(escape), t, *end, escape.p, -escape.direction, 1.0);
     sink.add(w * escape.throughput * end->emitted, path(0, t, *end, escape.roulette));
   }
 
@@ -111,7 +118,7 @@ class BidirectionalTracer {
     const double geometry = std::abs(b.at.n_g.dot(v) / b.at.n_g.dot(b.wi)) * inverse_r2;
     const double w = weights_.connection(z, y, v, inverse_r2);
     sink.add(w * geometry * z.throughput * f * y.throughput,
-             path(s, t, end_, z.roulette * y.roulette));
+             path(s, t, emission_.end, z.roulette * y.roulette));
   }
 
   /// t = 1
@@ -119,7 +126,8 @@ class BidirectionalTracer {
   void connect_to_sensor(const SubpathVertex& y, int s, Sink& sink) const {
     const auto seen = driftlight::connect_to_sensor(scene_, y);
     if (seen)
-      sink.splat(seen->film, weights_.sensor(y, *seen) * seen->value, path(s, 1, end_, y.roulette));
+      sink.splat(seen->film, weights_.sensor(y, *seen) * seen->value,
+                 path(s, 1, emission_.end, y.roulette));
   }
 
   FoundPath path(int s, int t, const LightEnd& end, double roulette) const {
@@ -127,12 +135,13 @@ class BidirectionalTracer {
   }
 
   const Scene& scene_;
+  const EmissionGuide& guide_;
   SubpathTracer tracer_;
   StrategyWeights weights_;
   int max_depth_;
   // Of the sample in hand.
   Vec3d v_{0, 0, 0};
-  LightEnd end_;  ///< where `from_light_` comes from
+  Emission emission_;  ///< that `from_light_` starts with
   Subpath from_sensor_;
   Subpath from_light_;
 };

@@ -40,10 +40,18 @@ Vec3d SpotEmitter::falloff_gradient(const Vec3d& v) const {
 ///   F(theta) = ((c - b) cos b + sin b - (c - theta) cos theta - sin theta) / (c - b),
 ///   F' = (c - theta) sin theta / (c - b),
 /// which Newton steps invert, kept inside a bracket.
+double SpotEmitter::integral(double theta) const {
+  const double half_sine = std::sin(0.5 * std::min(theta, beam_width_));
+  const double in_beam = 2.0 * half_sine * half_sine;
+  if (theta <= beam_width_) return in_beam;
+  const double start = (cutoff_ - beam_width_) * std::cos(beam_width_) + std::sin(beam_width_);
+  const double sum = start - (cutoff_ - theta) * std::cos(theta) - std::sin(theta);
+  return in_beam + sum * inverse_transition_;
+}
+
 Vec3d SpotEmitter::sample(double u1, double u2) const {
   const double share = u1 * 0.5 * kInvPi * solid_angle_;
-  const double half_sine = std::sin(0.5 * beam_width_);
-  const double in_beam = 2.0 * half_sine * half_sine;
+  const double in_beam = integral(beam_width_);
   // Rounding must not carry a direction to the rim, where the density is 0.
   const double most = (1.0 - 1e-12) * cutoff_;
   double theta = 2.0 * std::asin(std::sqrt(0.5 * std::min(share, in_beam)));
@@ -51,10 +59,8 @@ Vec3d SpotEmitter::sample(double u1, double u2) const {
     double low = beam_width_;
     double high = most;
     theta = 0.5 * (low + high);
-    const double start = (cutoff_ - beam_width_) * std::cos(beam_width_) + std::sin(beam_width_);
     for (int i = 0; i < 60 && high - low > 1e-13 * cutoff_; ++i) {
-      const double sum = start - (cutoff_ - theta) * std::cos(theta) - std::sin(theta);
-      const double excess = sum * inverse_transition_ - (share - in_beam);
+      const double excess = integral(theta) - share;
       (excess > 0.0 ? high : low) = theta;
       const double step =
           excess / ((cutoff_ - theta) * std::sin(theta) * inverse_transition_ + 1e-300);
@@ -70,6 +76,12 @@ Vec3d SpotEmitter::sample(double u1, double u2) const {
   return to_world({sine * std::cos(phi), sine * std::sin(phi), std::cos(theta)}, axis_);
 }
 
+Vec2d SpotEmitter::inverse(const Vec3d& v) const {
+  const Vec3d local = to_local(v, axis_);
+  const double share = integral(std::min(angle(v), cutoff_)) * 2.0 * kPi / solid_angle_;
+  return {std::min(share, 1.0), disk_to_square(local.head<2>()).y()};
+}
+
 // ---- EnvironmentMap -------------------------------------------------------------------------
 
 EnvironmentMap::EnvironmentMap(Bitmap bitmap, const Eigen::Matrix3d& to_world, double scale)
@@ -81,6 +93,10 @@ EnvironmentMap::EnvironmentMap(Bitmap bitmap, const Eigen::Matrix3d& to_world, d
   // Within a patch the interpolant is at most the largest corner and at least a quarter of it
   // somewhere: the mean of the corners keeps f / pdf bounded and the pdf positive where eval is.
   const auto width = static_cast<std::size_t>(bitmap_.width);
+  for (int edge = 0; edge <= bitmap_.height + 1; ++edge) {
+    const double y = std::clamp(edge - 0.5, 0.0, static_cast<double>(bitmap_.height));
+    edges_.push_back(std::cos(kPi * y / bitmap_.height));
+  }
   std::vector<double> row_weights;
   std::vector<double> weights(width);
   for (int row = 0; row <= bitmap_.height; ++row) {
@@ -122,10 +138,8 @@ Eigen::Matrix3d EnvironmentMap::gradient(const Vec3d& d) const {
 
 /// Patch row r spans the map's y in [r - 1/2, r + 1/2], cut at the poles.
 double EnvironmentMap::patch_solid_angle(int row) const {
-  const double height = bitmap_.height;
-  const double top = kPi * std::max(row - 0.5, 0.0) / height;
-  const double bottom = kPi * std::min(row + 0.5, height) / height;
-  return (std::cos(top) - std::cos(bottom)) * 2.0 * kPi / bitmap_.width;
+  const auto r = static_cast<std::size_t>(row);
+  return (edges_[r] - edges_[r + 1]) * 2.0 * kPi / bitmap_.width;
 }
 
 int EnvironmentMap::row_of(double y) const {
@@ -135,23 +149,38 @@ int EnvironmentMap::row_of(double y) const {
 Vec3d EnvironmentMap::sample(double u1, double u2) const {
   const int row = rows_.sample(u1);
   const int column = columns_[static_cast<std::size_t>(row)].sample(u2);
-  const double height = bitmap_.height;
-  const double cos_top = std::cos(kPi * std::max(row - 0.5, 0.0) / height);
-  const double cos_bottom = std::cos(kPi * std::min(row + 0.5, height) / height);
-  const double y = cos_top + u1 * (cos_bottom - cos_top);
-  const double r = std::sqrt(std::max(0.0, 1.0 - y * y));
+  const auto r = static_cast<std::size_t>(row);
+  const double y = edges_[r] + u1 * (edges_[r + 1] - edges_[r]);
+  const double sine = std::sqrt(std::max(0.0, 1.0 - y * y));
   const double phi = 2.0 * kPi * (column + 0.5 + u2) / bitmap_.width;
-  return (r * std::sin(phi) * axis_x_ + y * axis_y_ - r * std::cos(phi) * axis_z_).normalized();
+  return (sine * std::sin(phi) * axis_x_ + y * axis_y_ - sine * std::cos(phi) * axis_z_)
+      .normalized();
+}
+
+EnvironmentMap::Place EnvironmentMap::place_of(const Vec3d& d) const {
+  const double dy = std::clamp(axis_y_.dot(d), -1.0, 1.0);
+  const double x = std::atan2(axis_x_.dot(d), -axis_z_.dot(d)) * 0.5 * kInvPi * bitmap_.width - 0.5;
+  Place place;
+  place.row = row_of(std::acos(dy) * kInvPi * bitmap_.height);
+  const double left = std::floor(x);
+  place.column = static_cast<int>(left) % bitmap_.width;
+  if (place.column < 0) place.column += bitmap_.width;
+  const auto r = static_cast<std::size_t>(place.row);
+  place.offset = {(edges_[r] - dy) / (edges_[r] - edges_[r + 1]), x - left};
+  return place;
+}
+
+Vec2d EnvironmentMap::inverse(const Vec3d& d) const {
+  const Place at = place_of(d);
+  return {rows_.inverse(at.row, at.offset.x()),
+          columns_[static_cast<std::size_t>(at.row)].inverse(at.column, at.offset.y())};
 }
 
 double EnvironmentMap::pdf(const Vec3d& d) const {
-  const double dy = std::clamp(axis_y_.dot(d), -1.0, 1.0);
-  const double x = std::atan2(axis_x_.dot(d), -axis_z_.dot(d)) * 0.5 * kInvPi * bitmap_.width - 0.5;
-  const int row = row_of(std::acos(dy) * kInvPi * bitmap_.height);
-  int column = static_cast<int>(std::floor(x)) % bitmap_.width;
-  if (column < 0) column += bitmap_.width;
-  return rows_.probability(row) * columns_[static_cast<std::size_t>(row)].probability(column) /
-         patch_solid_angle(row);
+  const Place at = place_of(d);
+  return rows_.probability(at.row) *
+         columns_[static_cast<std::size_t>(at.row)].probability(at.column) /
+         patch_solid_angle(at.row);
 }
 
 }  // namespace driftlight

@@ -37,13 +37,7 @@ CameraPart camera_part(const Scene& scene, const FoundPath& found, PhaseSpace ph
 }
 
 LightPart light_part(const FoundPath& found) {
-  LightPart light;
-  light.emitter = found.end.emitter;
-  light.infinite = found.end.at_infinity();
-  if (light.infinite)
-    light.sky = found.end.p;
-  else
-    light.point = {found.end.p, found.end.n};
+  LightPart light = light_part_from(found.end);
   for (int i = 0; i < found.s - 1; ++i) {
     const SubpathVertex& y = found.from_light[i];
     LightPart::Vertex& vertex = light.vertices[static_cast<std::size_t>(light.count++)];

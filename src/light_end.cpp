@@ -23,18 +23,6 @@ LightEnd environment_end(const Scene& scene, std::uint32_t index, const Vec3d& d
   return end;
 }
 
-LightEnd area_end(const Scene& scene, std::uint32_t index, const EmitterPoint& y) {
-  const auto& light = std::get<AreaEmitter>(scene.emitters()[index]);
-  LightEnd end;
-  end.kind = LightEnd::Kind::Area;
-  end.emitter = index;
-  end.p = y.p;
-  end.n = y.n;
-  end.emitted = light.radiance;
-  end.density = scene.emitter_probability(index) / scene.shapes()[light.shape].extent.area;
-  return end;
-}
-
 /// A point, spot or directional emitter.
 LightEnd delta_end(const Scene& scene, std::uint32_t index) {
   const Emitter& emitter = scene.emitters()[index];
@@ -57,10 +45,25 @@ LightEnd delta_end(const Scene& scene, std::uint32_t index) {
 
 }  // namespace
 
+LightEnd area_end(const Scene& scene, std::uint32_t index, const EmitterPoint& y) {
+  const auto& light = std::get<AreaEmitter>(scene.emitters()[index]);
+  LightEnd end;
+  end.kind = LightEnd::Kind::Area;
+  end.emitter = index;
+  end.p = y.p;
+  end.n = y.n;
+  end.emitted = light.radiance;
+  end.density = scene.emitter_probability(index) / scene.shapes()[light.shape].extent.area;
+  return end;
+}
+
 LightEnd sample_light_end(const Scene& scene, Rng& rng) {
   double u = rng.uniform();
   const std::uint32_t index = scene.sample_emitter(u);
-  const Vec2d square = rng.uniform2();
+  return light_end_from(scene, index, rng.uniform2());
+}
+
+LightEnd light_end_from(const Scene& scene, std::uint32_t index, const Vec2d& square) {
   const Emitter& emitter = scene.emitters()[index];
   if (const auto* map = std::get_if<EnvironmentMap>(&emitter))
     return environment_end(scene, index, map->sample(square.x(), square.y()));
@@ -96,42 +99,6 @@ bool reaches(const Scene& scene, const LightEnd& end, const SurfaceHit& surface,
   if (end.at_infinity()) return infinity_status(scene, surface, edge.direction) == TraceStatus::Ok;
   return connection_status(scene, surface, scene.emitters()[end.emitter], {end.p, end.n}) ==
          TraceStatus::Ok;
-}
-
-double emission_density(const Scene& scene, const LightEnd& end, double cosine, double falloff) {
-  switch (end.kind) {
-    case LightEnd::Kind::Area:
-      return cosine * kInvPi;
-    case LightEnd::Kind::Point:
-      return end.spot != nullptr ? falloff / end.spot->solid_angle() : 0.25 * kInvPi;
-    case LightEnd::Kind::Environment:
-    case LightEnd::Kind::Directional:
-      break;
-  }
-  return kInvPi / (scene.radius() * scene.radius());
-}
-
-Emission sample_emission(const Scene& scene, const LightEnd& end, Rng& rng) {
-  const Vec2d u = rng.uniform2();
-  switch (end.kind) {
-    case LightEnd::Kind::Area: {
-      const Vec3d local = square_to_cosine_hemisphere(u.x(), u.y());
-      const Vec3d v = to_world(local, end.n);
-      return {end.p, scene.leave(end.p, end.n, v), v, local.z(), 1.0};
-    }
-    case LightEnd::Kind::Point: {
-      const bool even = end.spot == nullptr;
-      const Vec3d v = even ? square_to_sphere(u.x(), u.y()) : end.spot->sample(u.x(), u.y());
-      return {end.p, end.p, v, 1.0, end.falloff(v)};
-    }
-    case LightEnd::Kind::Environment:
-    case LightEnd::Kind::Directional:
-      break;
-  }
-  // From the disk that touches the bounding sphere, across the ray.
-  const Vec2d disk = square_to_disk(u.x(), u.y());
-  const Vec3d origin = scene.center() + scene.radius() * to_world({disk.x(), disk.y(), 1.0}, end.p);
-  return {origin, origin, -end.p, 1.0, 1.0};
 }
 
 }  // namespace driftlight

@@ -36,6 +36,10 @@ struct LightEnd {
 
 /// Draws an emitter and a point on it.
 LightEnd sample_light_end(const Scene& scene, Rng& rng);
+/// The point of a given emitter that a point of the unit square makes.
+LightEnd light_end_from(const Scene& scene, std::uint32_t emitter, const Vec2d& square);
+/// A given point on an area emitter.
+LightEnd area_end(const Scene& scene, std::uint32_t emitter, const EmitterPoint& y);
 /// The end of a ray that has come to the surface; none if nothing is emitted toward it.
 std::optional<LightEnd> light_end_at(const Scene& scene, const SurfaceHit& surface);
 /// The end of a ray that leaves the scene; none without an environment.
@@ -55,20 +59,5 @@ LightEdge edge_to(const LightEnd& end, const Vec3d& p);
 /// Whether light passes along that edge.
 bool reaches(const Scene& scene, const LightEnd& end, const SurfaceHit& surface,
              const LightEdge& edge);
-
-/// Density of the ray that leaves the end, for a cosine > 0 with its normal:
-///   area cos / pi per solid angle, point 1 / (4 pi) per solid angle, spot falloff / (its
-///   integral), at infinity 1 / (pi R^2) per area across the ray, R the radius of the scene.
-double emission_density(const Scene& scene, const LightEnd& end, double cosine, double falloff);
-
-/// A ray drawn with that density.
-struct Emission {
-  Vec3d origin;
-  Vec3d start;  ///< the origin, moved off its surface
-  Vec3d direction;
-  double cosine;   ///< with the normal of an area emitter; else 1
-  double falloff;  ///< of `emitted`, along the direction
-};
-Emission sample_emission(const Scene& scene, const LightEnd& end, Rng& rng);
 
 }  // namespace driftlight

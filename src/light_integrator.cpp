@@ -6,6 +6,7 @@
 #include "pass_loop.h"
 #include "sample_film.h"
 #include "sensor_connection.h"
+#include "subpath.h"
 
 namespace driftlight {
 namespace {
@@ -13,14 +14,16 @@ namespace {
 class LightTracer {
  public:
   /// There are no weights: the heuristic does not matter.
-  LightTracer(const Scene& scene, int max_depth)
-      : scene_(scene), tracer_(scene, MisHeuristic::Balance), max_depth_(max_depth) {}
+  LightTracer(const Scene& scene, const EmissionGuide& unguided, int max_depth)
+      : scene_(scene),
+        unguided_(unguided),
+        tracer_(scene, unguided, MisHeuristic::Balance),
+        max_depth_(max_depth) {}
 
   void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& sink) {
     sink.add(directly_seen(scene_.camera().direction(film)));
-    const LightEnd end = sample_light_end(scene_, rng);
-    const Emission emission = sample_emission(scene_, end, rng);
-    tracer_.trace(Walk::FromLight, tracer_.leave_light(end, emission),
+    const Emission emission = unguided_.sample(rng);
+    tracer_.trace(Walk::FromLight, tracer_.leave_light(emission),
                   RayFollower(scene_, emission.origin, emission.start, emission.direction),
                   max_depth_ - 1, rng, subpath_);
     for (int i = 0; i < subpath_.size(); ++i) {
@@ -41,6 +44,7 @@ class LightTracer {
   }
 
   const Scene& scene_;
+  const EmissionGuide& unguided_;
   SubpathTracer tracer_;
   int max_depth_;
   Subpath subpath_;  ///< kept between samples for its storage only
@@ -51,7 +55,8 @@ class LightTracer {
 PathResult render_light(const Scene& scene, const LightOptions& options,
                         const RenderOptions& render, int samples_per_pixel) {
   options.validate();
-  const LightTracer tracer(scene, options.max_depth);
+  const EmissionGuide unguided(scene);
+  const LightTracer tracer(scene, unguided, options.max_depth);
   SampleFilm film(scene.camera(), render.seed, 0);
   tbb::task_arena arena(render.threads > 0 ? render.threads : tbb::task_arena::automatic);
   PathResult result = arena.execute([&] {

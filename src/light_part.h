@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "driftlight/random.h"
-#include "ray_follower.h"
+#include "light_end.h"
 
 namespace driftlight {
 
@@ -30,6 +30,9 @@ struct LightPart {
 
   const Vertex& operator[](int i) const { return vertices[static_cast<std::size_t>(i)]; }
 };
+
+/// The light part that is an end alone.
+LightPart light_part_from(const LightEnd& end);
 
 /// Draws an emitter, a point on it (a direction, of an environment) and, for surface_vertices > 0,
 /// an emitted ray and as many surface vertices by BSDF sampling, with the densities of

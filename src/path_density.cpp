@@ -30,14 +30,20 @@ struct Vertex {
 
 class Recorder : public WalkVisitor<double> {
  public:
-  Recorder(const Scene& scene, const PathTopology& topology)
-      : scene_(scene), scatter_count_(topology.scatter_count), last_(scene.camera().origin) {}
+  Recorder(const Scene& scene, const EmissionGuide& guide, const PathTopology& topology)
+      : scene_(scene),
+        guide_(guide),
+        emitter_(topology.emitter),
+        scatter_count_(topology.scatter_count),
+        last_(scene.camera().origin),
+        before_last_(last_) {}
 
   void sensor(const PerspectiveCamera& camera, const Vec3d& v) {
     importance = std::exp(camera.log_importance(v));
   }
   void position(const Shape&, const Vec3d& p) {
     r2 = (p - last_).squaredNorm();
+    before_last_ = last_;
     last_ = p;
   }
   void scatter(const ScatterEvent<double>& e) {
@@ -64,10 +70,12 @@ class Recorder : public WalkVisitor<double> {
   }
   void hit(const AreaEmitter& light, const double& cosine, const double& squared) {
     area_end(light, cosine, squared);
+    guide_emission(last_, (before_last_ - last_) / std::sqrt(squared));
     measure = 1.0;
   }
   void area_connection(const AreaEmitter& light, const double& cosine, const double& squared) {
     area_end(light, cosine, squared);
+    guide_emission(last_, (before_last_ - last_) / std::sqrt(squared));
     measure = cosine / squared;
   }
   void environment(const Emitter& light, const Vec3d& v) {
@@ -75,17 +83,15 @@ class Recorder : public WalkVisitor<double> {
     const double direction = map != nullptr ? map->pdf(v) : 0.25 * kInvPi;
     connected = direction;
     emitted = direction * kInvPi / (scene_.radius() * scene_.radius());
+    guide_emission(last_, -v);
   }
   void point_connection(const Emitter& light, const Vec3d& wo, const double& squared) {
     connected = 1.0;
     emitted = emission_density(light, Vec3d(-wo)) / squared;
+    guide_emission(position_of(light), -wo);
     can_hit = false;
   }
-  void directional_connection(const DirectionalEmitter&) {
-    connected = 1.0;
-    emitted = kInvPi / (scene_.radius() * scene_.radius());
-    can_hit = false;
-  }
+  void directional_connection(const DirectionalEmitter& light) { parallel_end(light, last_); }
 
   void vertex(int k) { index_ = static_cast<std::size_t>(k); }
   void light_scatter(const ScatterEvent<double>& e) {
@@ -100,17 +106,19 @@ class Recorder : public WalkVisitor<double> {
   void area_emission(const AreaEmitter& light, const Vec3d& normal, const Vec3d& v) {
     const double cosine = normal.dot(v);
     area_end(light, cosine, 1.0);
+    guide_emission(last_, v);
     end_ = last_;
     measure = cosine;
   }
   void point_emission(const Emitter& light, const Vec3d& v) {
     emitted = emission_density(light, v);
+    guide_emission(position_of(light), v);
     connected = 1.0;
     end_ = position_of(light);
     can_hit = false;
   }
-  void directional_emission(const DirectionalEmitter& light, const Vec3d&) {
-    directional_connection(light);
+  void directional_emission(const DirectionalEmitter& light, const Vec3d& offset) {
+    parallel_end(light, scene_.center() + scene_.radius() * offset);
   }
   /// All vertices are known: their distances in order from the sensor.
   void joined(const double& squared) {
@@ -153,19 +161,29 @@ class Recorder : public WalkVisitor<double> {
     connected = per_area * squared / cosine;
     emitted = per_area * kInvPi;
   }
+  void parallel_end(const DirectionalEmitter& light, const Vec3d& p) {
+    connected = 1.0;
+    emitted = kInvPi / (scene_.radius() * scene_.radius());
+    guide_emission(p, light.direction);
+    can_hit = false;
+  }
+  void guide_emission(const Vec3d& p, const Vec3d& v) { emitted *= guide_.factor(emitter_, p, v); }
 
   const Scene& scene_;
+  const EmissionGuide& guide_;
+  std::uint32_t emitter_;
   std::size_t scatter_count_;
   std::size_t index_ = 0;
-  Vec3d last_;
+  Vec3d last_, before_last_;  ///< of the positions visited
   std::optional<Vec3d> end_;  ///< the point that a light side begins at
 };
 
 }  // namespace
 
-StrategyDensities strategy_densities(const Scene& scene, const PathTopology& topology,
+StrategyDensities strategy_densities(const Scene& scene, const EmissionGuide& guide,
+                                     const PathTopology& topology,
                                      const PathCoordinates& coordinates) {
-  Recorder path(scene, topology);
+  Recorder path(scene, guide, topology);
   walk<double>(scene, topology, coordinates, path);
   const int n = topology.length();
   const auto vertex = [&](int k) -> const Vertex& {

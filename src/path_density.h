@@ -21,12 +21,14 @@
 /// direction, p(omega), and by the point where the ray crosses a disk of the scene's radius R,
 /// which gives p(omega) / (pi R^2) in place of l_n / cos_n; a point or spot emitter has no area to
 /// convert, p(dA_a | x_n) = l_n cos_a / r^2 with l_n = 1 / (4 pi) or falloff / (its integral); a
-/// directional emitter has its one direction, p(dA_a) = cos_a / (pi R^2).
+/// directional emitter has its one direction, p(dA_a) = cos_a / (pi R^2). A guide
+/// multiplies l_n.
 #pragma once
 
 #include <array>
 
 #include "driftlight/phase_space.h"
+#include "emission_guide.h"
 
 namespace driftlight {
 
@@ -40,7 +42,9 @@ struct StrategyDensities {
 /// solid angles into dA d omega of the emitter, as in contribution.h; a point emitter has its d
 /// omega in the place of dA of the first vertex behind it. There a delta vertex is no obstacle:
 /// what the chain behind the point makes of d omega is the same for all strategies.
-StrategyDensities strategy_densities(const Scene& scene, const PathTopology& topology,
+/// Light subpaths are those of the guide.
+StrategyDensities strategy_densities(const Scene& scene, const EmissionGuide& guide,
+                                     const PathTopology& topology,
                                      const PathCoordinates& coordinates);
 
 }  // namespace driftlight

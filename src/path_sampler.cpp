@@ -105,7 +105,8 @@ double PathSampler::log_density(const PathTopology& topology,
   const bool too_long = n + 1 >= first_of_length_.size();
   if (too_long || first_of_length_[n] == first_of_length_[n + 1])
     return -std::numeric_limits<double>::infinity();
-  const StrategyDensities q = strategy_densities(scene_, topology, coordinates);
+  const StrategyDensities q =
+      strategy_densities(scene_, EmissionGuide(scene_), topology, coordinates);
   const int first = first_of_length_[n];
   const int end = first_of_length_[n + 1];
   double sum = 0;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "redistribution.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <mutex>
@@ -13,14 +11,13 @@
 #include "exact_sum.h"
 #include "found_path.h"
 #include "pass_loop.h"
+#include "pilot.h"
 #include "remainder.h"
 #include "sample_film.h"
 
 namespace driftlight {
 namespace {
 
-/// Samples of the pilot that learns the brightness.
-constexpr std::uint64_t kPilotSamples = 65536;
 /// Most chains that start from one sample, and how much longer than usual they may become.
 constexpr double kMostChains = 16;
 constexpr double kMostStretch = 16;
@@ -28,45 +25,12 @@ constexpr double kMostStretch = 16;
 /// mutations no longer pay.
 constexpr double kLeastDeposit = 0.2;
 
-/// Collects the luminances of what is found.
-class PilotSink {
- public:
-  PilotSink(const Vec2d& film, std::vector<FilmValue>& found) : film_(film), found_(found) {}
-
-  void add(const Rgbd& value, const FoundPath& path) { splat(film_, value, path); }
-  void splat(const Vec2d& film, const Rgbd& value, const FoundPath& /*path*/) {
-    const double y = luminance(value);
-    if (std::isfinite(y) && y > 0.0) found_.push_back({film, y});
-  }
-
- private:
-  Vec2d film_;
-  std::vector<FilmValue>& found_;
-};
-
-BrightnessMap pilot(const Scene& scene, const LangevinOptions& options, std::uint64_t seed) {
-  constexpr std::uint64_t kTask = 256;
-  std::vector<std::vector<FilmValue>> found(kPilotSamples / kTask);
-  tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t i) {
-    BidirectionalTracer tracer(scene, MisHeuristic::Balance, options.max_depth);
-    for (std::uint64_t k = 0; k < kTask; ++k) {
-      Rng rng(seed, Stream::Pilot, i * kTask + k);
-      const Vec2d film = rng.uniform2();
-      PilotSink sink(film, found[i]);
-      tracer.sample(film, rng, sink);
-    }
-  });
-  std::vector<FilmValue> all;
-  for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());
-  return BrightnessMap(all, static_cast<double>(kPilotSamples));
-}
-
 /// What all samples of a render share.
 struct Redistribution {
   const Scene& scene;
   const LangevinOptions& options;
   StepLayers* layers;
-  BrightnessMap brightness;
+  Pilot pilot;
   Remainder remainder;
   Film film;       ///< of the chains, in units of `unit`
   double unit;     ///< bright enough that fixed point does not overflow
@@ -77,10 +41,10 @@ struct Redistribution {
       : scene(of_scene),
         options(with),
         layers(render.layers),
-        brightness(pilot(scene, options, render.seed)),
-        remainder(scene, brightness, options.redistribution.threshold),
+        pilot(run_pilot(scene, options, render.seed)),
+        remainder(scene, pilot.guide, pilot.brightness, options.redistribution.threshold),
         film(scene.camera().film_width, scene.camera().film_height),
-        unit(64.0 * brightness.max()),
+        unit(64.0 * pilot.brightness.max()),
         deposit(kLeastDeposit) {}
 
   /// From the mean remainder of a sample so far.
@@ -114,7 +78,7 @@ class RedistributionSampler {
  public:
   explicit RedistributionSampler(Redistribution& common)
       : common_(common),
-        tracer_(common.scene, MisHeuristic::Balance, common.options.max_depth),
+        tracer_(common.scene, common.pilot.guide, MisHeuristic::Balance, common.options.max_depth),
         chain_(common.scene, common.options.kernel, common.remainder, common.layers) {}
 
   void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& film_sink) {
@@ -152,7 +116,7 @@ class RedistributionSampler {
   double share_of_sample(const Vec2d& film, const Rgbd& value, const FoundPath& path) {
     const double tau = common_.remainder.tau();
     // By balance weights the value is f / q.
-    const double w = luminance(value) / (path.roulette * common_.brightness(film));
+    const double w = luminance(value) / (path.roulette * common_.pilot.brightness(film));
     if (!(w > tau)) return 1.0;
     const auto sample = state_of(common_.scene, path, common_.options.phase_space);
     if (!sample) return 1.0;

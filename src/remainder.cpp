@@ -15,7 +15,7 @@ constexpr double kMostW = 1e9;
 
 Share Remainder::share(const PathTopology& topology, const PathCoordinates& coordinates,
                        const Contribution& contribution) const {
-  const StrategyDensities densities = strategy_densities(scene_, topology, coordinates);
+  const StrategyDensities densities = strategy_densities(scene_, guide_, topology, coordinates);
   const int n = topology.length();
   // Bidirectional path tracing leaves emitters that are seen directly to s = 0.
   double q = densities.by_light_vertices[0];

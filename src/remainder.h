@@ -13,6 +13,7 @@
 
 #include "brightness_map.h"
 #include "driftlight/small_step.h"
+#include "emission_guide.h"
 
 namespace driftlight {
 
@@ -26,8 +27,10 @@ struct Share {
 
 class Remainder {
  public:
-  Remainder(const Scene& scene, const BrightnessMap& brightness, double tau)
-      : scene_(scene), brightness_(brightness), tau_(tau) {}
+  /// q is of samples by this guide. All references must outlive it.
+  Remainder(const Scene& scene, const EmissionGuide& guide, const BrightnessMap& brightness,
+            double tau)
+      : scene_(scene), guide_(guide), brightness_(brightness), tau_(tau) {}
 
   double tau() const { return tau_; }
   /// Of a path with light. A path so bright that sums might overflow, or whose density is not
@@ -37,6 +40,7 @@ class Remainder {
 
  private:
   const Scene& scene_;
+  const EmissionGuide& guide_;
   const BrightnessMap& brightness_;
   double tau_;
 };

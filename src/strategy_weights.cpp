@@ -16,16 +16,18 @@ double cosine_at(const SurfaceHit& x, const Vec3d& v) { return std::abs(x.at.n_g
 }  // namespace
 
 /// The light's walk makes the end by emitter sampling, and the vertex before it by emission.
-double StrategyWeights::hit(const Arrival& z, int t, const LightEnd& end, double cosine) const {
+double StrategyWeights::hit(const Arrival& z, int t, const LightEnd& end, const Vec3d& p,
+                            const Vec3d& v, double cosine) const {
   if (t == 2) return 1.0;
-  return 1.0 / (1.0 + others(z, end.density, emission_density(scene_, end, cosine, 1.0)));
+  return 1.0 / (1.0 + others(z, end.density, guide_.density(end, p, v, cosine, 1.0)));
 }
 
 double StrategyWeights::emitter(const SubpathVertex& z, const LightEnd& end,
                                 const LightEdge& edge) const {
   const SurfaceHit& x = z.surface;
   const Vec3d& wo = edge.direction;
-  const double to_z = emission_density(scene_, end, edge.cosine, edge.falloff) * cosine_at(x, wo);
+  const Vec3d& p = end.at_infinity() ? x.at.p : end.p;
+  const double to_z = guide_.density(end, p, -wo, edge.cosine, edge.falloff) * cosine_at(x, wo);
   double sum = others(z, to_z * edge.inverse_r2, direction_density(x, wo, x.wi));
   if (end.can_be_hit()) {
     const double to_end = direction_density(x, x.wi, wo) * edge.cosine * edge.inverse_r2;

@@ -11,12 +11,15 @@ namespace driftlight {
 /// the subpath from the sensor, y of that from the light.
 class StrategyWeights {
  public:
-  StrategyWeights(const Scene& scene, MisHeuristic heuristic) : scene_(scene), power_(heuristic) {}
+  /// Light subpaths are those of the guide, which must outlive it.
+  StrategyWeights(const EmissionGuide& guide, MisHeuristic heuristic)
+      : guide_(guide), power_(heuristic) {}
 
-  /// (0, t): the subpath arrives at the light end, under this cosine with its normal (1 at
-  /// infinity). 1 for t = 2: emitters that are seen directly are left to camera rays, which have no
-  /// noise there but that of edges.
-  double hit(const Arrival& z, int t, const LightEnd& end, double cosine) const;
+  /// (0, t): the subpath arrives at the light end along -v, from p if that is at infinity, under
+  /// this cosine with its normal (1 at infinity). 1 for t = 2: emitters that are seen directly are
+  /// left to camera rays, which have no noise there but that of edges.
+  double hit(const Arrival& z, int t, const LightEnd& end, const Vec3d& p, const Vec3d& v,
+             double cosine) const;
   /// (1, t): z connects to a light end drawn by sample_light_end.
   double emitter(const SubpathVertex& z, const LightEnd& end, const LightEdge& edge) const;
   /// (s, t) with s, t > 1: v from z to y is of unit length.
@@ -32,7 +35,7 @@ class StrategyWeights {
            (power_(backward) * x.others + (x.previous_connects ? 1.0 : 0.0));
   }
 
-  const Scene& scene_;
+  const EmissionGuide& guide_;
   MisPower power_;
 };
 

@@ -61,13 +61,14 @@ Departure SubpathTracer::leave_sensor(const Vec3d& v) const {
 }
 
 /// L cos / (p(y) p(omega)), with a spot's falloff; the strategy s = 0 gives up y if it can be hit.
-Departure SubpathTracer::leave_light(const LightEnd& end, const Emission& emission) const {
+Departure SubpathTracer::leave_light(const Emission& emission) const {
+  const LightEnd& end = emission.end;
   Departure from;
   from.p = end.p;
   from.direction = emission.direction;
   from.at_infinity = end.at_infinity();
   from.cosine = emission.cosine;
-  from.density = emission_density(scene_, end, emission.cosine, emission.falloff);
+  from.density = guide_.density(emission);
   from.throughput =
       end.emitted * (emission.falloff * emission.cosine / (end.density * from.density));
   from.others = end.can_be_hit() ? 1.0 / power_(end.density) : 0.0;

@@ -29,7 +29,7 @@
 #include <optional>
 
 #include "driftlight/options.h"
-#include "light_end.h"
+#include "emission_guide.h"
 
 namespace driftlight {
 
@@ -93,12 +93,14 @@ class MisPower {
 
 class SubpathTracer {
  public:
-  SubpathTracer(const Scene& scene, MisHeuristic heuristic) : scene_(scene), power_(heuristic) {}
+  /// Walks from the light begin as the guide says, which must outlive it.
+  SubpathTracer(const Scene& scene, const EmissionGuide& guide, MisHeuristic heuristic)
+      : scene_(scene), guide_(guide), power_(heuristic) {}
 
   /// Leaves the sensor along v. Its throughput makes the path an estimate of the radiance there.
   Departure leave_sensor(const Vec3d& v) const;
-  /// Leaves a light end along a ray of sample_emission.
-  Departure leave_light(const LightEnd& end, const Emission& emission) const;
+  /// Leaves the light along a ray.
+  Departure leave_light(const Emission& emission) const;
   /// Comes to a surface.
   SubpathVertex arrive(const Departure& from, const SurfaceHit& surface) const;
   /// Leaves the scene.
@@ -113,6 +115,7 @@ class SubpathTracer {
 
  private:
   const Scene& scene_;
+  const EmissionGuide& guide_;
   MisPower power_;
 };
 

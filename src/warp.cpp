@@ -33,6 +33,26 @@ Vec2d square_to_disk(double u1, double u2) {
   return {r * std::cos(phi), r * std::sin(phi)};
 }
 
+namespace {
+
+/// Angle of (x, y) in turns, in [0, 1].
+double turn(double x, double y) {
+  const double turns = 0.5 * kInvPi * std::atan2(y, x);
+  return turns < 0.0 ? turns + 1.0 : turns;
+}
+
+}  // namespace
+
+Vec2d sphere_to_square(const Vec3d& v) {
+  return {std::clamp(0.5 * (1.0 - v.z()), 0.0, 1.0), turn(v.x(), v.y())};
+}
+
+Vec2d cosine_hemisphere_to_square(const Vec3d& v) { return disk_to_square(v.head<2>()); }
+
+Vec2d disk_to_square(const Vec2d& p) {
+  return {std::min(p.squaredNorm(), 1.0), turn(p.x(), p.y())};
+}
+
 DiscreteDistribution::DiscreteDistribution(std::span<const double> weights) {
   cumulative_.reserve(weights.size() + 1);
   double sum = 0;

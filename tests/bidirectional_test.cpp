@@ -352,7 +352,7 @@ TEST(Bidirectional, DerivativesAgree) {
 TEST(Bidirectional, FactorIsARootOfTheConstraints) {
   int factors = 0;
   for (const TestScene* test : scenes()) {
-    over_light_sides(*test, 20000, [&](const Sample& path) {
+    over_light_sides(*test, 25000, [&](const Sample& path) {
       const Chart chart(test->scene, path.topology, path.coordinates);
       const int d = chart.dimension();
       Linearization linear;

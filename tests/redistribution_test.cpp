@@ -9,6 +9,7 @@
 #include "brightness_map.h"
 #include "driftlight/render.h"
 #include "found_path.h"
+#include "pilot.h"
 #include "remainder.h"
 #include "support/test_scenes.h"
 
@@ -48,8 +49,13 @@ TEST(FoundPath, ItsValueIsContributionOverDensity) {
   const BrightnessMap flat({}, 1.0);
   for (const TestScene& test : test_scenes()) {
     SCOPED_TRACE(test.name);
-    const Remainder remainder(test.scene, flat, 1.0);
-    BidirectionalTracer tracer(test.scene, MisHeuristic::Balance, test.max_depth);
+    // Guided, so that no density is as it was.
+    LangevinOptions options;
+    options.max_depth = test.max_depth;
+    options.redistribution.pilot = 8192;
+    const EmissionGuide guide = run_pilot(test.scene, options, 1).guide;
+    const Remainder remainder(test.scene, guide, flat, 1.0);
+    BidirectionalTracer tracer(test.scene, guide, MisHeuristic::Balance, test.max_depth);
     ComparingSink sink{test.scene, remainder, {}};
     for (std::uint64_t i = 0; i < 4000; ++i) {
       Rng rng(1, Stream::Test, i);

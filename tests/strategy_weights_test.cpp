@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "pilot.h"
 #include "support/test_scenes.h"
 
 namespace driftlight::test {
@@ -37,13 +38,18 @@ struct GivenPath {
     return end.kind == LightEnd::Kind::Area ? -end.n.dot(v.back()) : 1.0;
   }
   double falloff() const { return end.falloff(-v.back()); }
+  /// Some point of the first ray from the light.
+  Vec3d emission_point() const {
+    return infinite() && !scattering.empty() ? scattering.back().at.p : end.p;
+  }
 };
 
 /// Cuts a subpath from the sensor and ends it at an emitter: one that was hit, the environment that
 /// it escaped to, or a drawn one.
 std::optional<GivenPath> draw_path(const TestScene& test, Rng& rng) {
   const Scene& scene = test.scene;
-  const SubpathTracer tracer(scene, MisHeuristic::Balance);
+  const EmissionGuide unguided(scene);
+  const SubpathTracer tracer(scene, unguided, MisHeuristic::Balance);
   const Vec3d v = scene.camera().direction(rng.uniform2());
   Subpath subpath;
   const auto escape = tracer.trace(Walk::FromSensor, tracer.leave_sensor(v), RayFollower(scene, v),
@@ -95,9 +101,9 @@ std::vector<Departure> walk_from_sensor(const SubpathTracer& tracer, const Given
 /// Vertices x_(n-1), x_(n-2), .. as walked from the light.
 std::vector<SubpathVertex> walk_from_light(const SubpathTracer& tracer, const GivenPath& path) {
   std::vector<SubpathVertex> vertices;
-  const Emission emission{path.end.p, path.end.p, -path.v.back(), path.end_cosine(),
-                          path.falloff()};
-  Departure from = tracer.leave_light(path.end, emission);
+  const Emission emission{path.end,       path.emission_point(), path.end.p,
+                          -path.v.back(), path.end_cosine(),     path.falloff()};
+  Departure from = tracer.leave_light(emission);
   for (int k = path.length() - 1; k >= 1; --k) {
     SurfaceHit surface = path.x(k);
     surface.wi = path.direction(k);
@@ -118,10 +124,10 @@ bool possible(const GivenPath& path, int t) {
 }
 
 /// By t = 1 .. n + 1; 0 where impossible.
-std::vector<double> weights_by_walking(const Scene& scene, const GivenPath& path,
-                                       MisHeuristic heuristic) {
-  const SubpathTracer tracer(scene, heuristic);
-  const StrategyWeights weights(scene, heuristic);
+std::vector<double> weights_by_walking(const Scene& scene, const EmissionGuide& guide,
+                                       const GivenPath& path, MisHeuristic heuristic) {
+  const SubpathTracer tracer(scene, guide, heuristic);
+  const StrategyWeights weights(guide, heuristic);
   const int n = path.length();
   std::vector<SubpathVertex> z;
   const std::vector<Departure> departures = walk_from_sensor(tracer, path, z);
@@ -140,7 +146,8 @@ std::vector<double> weights_by_walking(const Scene& scene, const GivenPath& path
       surface.bsdf = nullptr;
       const Arrival arrival = path.infinite() ? tracer.arrive_at_infinity(departures.back())
                                               : tracer.arrive(departures.back(), surface);
-      w = weights.hit(arrival, t, path.end, path.end_cosine());
+      w = weights.hit(arrival, t, path.end, path.emission_point(), -path.v.back(),
+                      path.end_cosine());
     } else if (t == n) {
       w = weights.emitter(
           from_sensor(t - 1), path.end,
@@ -181,7 +188,7 @@ struct Densities {
   std::vector<double> sensor, light;
 };
 
-Densities densities(const Scene& scene, const GivenPath& path) {
+Densities densities(const Scene& scene, const EmissionGuide& guide, const GivenPath& path) {
   const int n = path.length();
   const auto index = [](int k) { return static_cast<std::size_t>(k); };
   Densities p{std::vector<double>(index(n + 1), 0.0), std::vector<double>(index(n + 1), 0.0)};
@@ -195,7 +202,8 @@ Densities densities(const Scene& scene, const GivenPath& path) {
   p.sensor[1] = scene.camera().log_importance(path.direction(0)) + geometry(1, 0);
   p.light[index(n)] = std::log(path.end.density);
   p.light[index(n - 1)] =
-      std::log(emission_density(scene, path.end, path.end_cosine(), path.falloff())) +
+      std::log(emission_density(scene, path.end, path.end_cosine(), path.falloff()) *
+               guide.factor(path.end.emitter, path.emission_point(), -path.v.back())) +
       geometry(n - 1, n - 1);
   for (int k = 1; k < n; ++k) {
     const SurfaceHit& x = path.x(k);
@@ -213,9 +221,9 @@ Densities densities(const Scene& scene, const GivenPath& path) {
   return p;
 }
 
-std::vector<double> weights_by_density(const Scene& scene, const GivenPath& path,
-                                       MisHeuristic heuristic) {
-  const Densities p = densities(scene, path);
+std::vector<double> weights_by_density(const Scene& scene, const EmissionGuide& guide,
+                                       const GivenPath& path, MisHeuristic heuristic) {
+  const Densities p = densities(scene, guide, path);
   const int n = path.length();
   const double exponent = heuristic == MisHeuristic::Power ? 2.0 : 1.0;
   std::vector<double> logs;
@@ -258,11 +266,16 @@ void count(const GivenPath& path, Coverage& seen) {
   seen.refracted += refracted ? 1 : 0;
 }
 
-/// Calls visit(scene, path) for random paths of all test scenes.
+/// Calls visit(scene, guide, path) for random paths of all test scenes, guided as a pilot of each
+/// has learned.
 template <class Visit>
 Coverage for_random_paths(const Visit& visit) {
   Coverage seen;
   for (const TestScene& test : test_scenes()) {
+    LangevinOptions options;
+    options.max_depth = test.max_depth;
+    options.redistribution.pilot = 8192;
+    const EmissionGuide guide = run_pilot(test.scene, options, 1).guide;
     for (std::uint64_t i = 0; i < 5000; ++i) {
       Rng rng(211, Stream::Test, i);
       const auto path = draw_path(test, rng);
@@ -277,7 +290,7 @@ Coverage for_random_paths(const Visit& visit) {
         }
       if (!smooth) continue;
       count(*path, seen);
-      visit(test.scene, *path);
+      visit(test.scene, guide, *path);
     }
   }
   return seen;
@@ -285,13 +298,14 @@ Coverage for_random_paths(const Visit& visit) {
 
 // Law: the weights of all strategies that can make a path add up to 1.
 TEST(StrategyWeights, AddUpToOne) {
-  const Coverage seen = for_random_paths([](const Scene& scene, const GivenPath& path) {
-    for (const MisHeuristic heuristic : {MisHeuristic::Balance, MisHeuristic::Power}) {
-      double sum = 0;
-      for (const double w : weights_by_walking(scene, path, heuristic)) sum += w;
-      EXPECT_NEAR(sum, 1.0, 1e-9) << path.length() << " edges";
-    }
-  });
+  const Coverage seen =
+      for_random_paths([](const Scene& scene, const EmissionGuide& guide, const GivenPath& path) {
+        for (const MisHeuristic heuristic : {MisHeuristic::Balance, MisHeuristic::Power}) {
+          double sum = 0;
+          for (const double w : weights_by_walking(scene, guide, path, heuristic)) sum += w;
+          EXPECT_NEAR(sum, 1.0, 1e-9) << path.length() << " edges";
+        }
+      });
   EXPECT_GT(seen.paths, 2000);
   EXPECT_GT(seen.hidden, 500);
   EXPECT_GT(seen.refracted, 300);
@@ -302,10 +316,10 @@ TEST(StrategyWeights, AddUpToOne) {
 // products over the whole path, those of smooth lobes turned round by finite differences.
 TEST(StrategyWeights, AreSharesByDensity) {
   int shared = 0;
-  for_random_paths([&](const Scene& scene, const GivenPath& path) {
+  for_random_paths([&](const Scene& scene, const EmissionGuide& guide, const GivenPath& path) {
     for (const MisHeuristic heuristic : {MisHeuristic::Balance, MisHeuristic::Power}) {
-      const std::vector<double> walked = weights_by_walking(scene, path, heuristic);
-      const std::vector<double> expected = weights_by_density(scene, path, heuristic);
+      const std::vector<double> walked = weights_by_walking(scene, guide, path, heuristic);
+      const std::vector<double> expected = weights_by_density(scene, guide, path, heuristic);
       for (std::size_t i = 0; i < walked.size(); ++i)
         EXPECT_NEAR(walked[i], expected[i], 1e-5) << path.length() << " edges, t = " << i + 1
                                                   << ", heuristic " << static_cast<int>(heuristic);

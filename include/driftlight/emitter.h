@@ -63,6 +63,8 @@ class SpotEmitter {
   /// Draws a direction in proportion to the falloff, whose density is falloff / solid_angle();
   /// u1, u2 in [0, 1).
   Vec3d sample(double u1, double u2) const;
+  /// The inverse of `sample`, for a direction in the cone.
+  Vec2d inverse(const Vec3d& v) const;
   /// Integral of the falloff over the sphere: power / intensity, steradians.
   double solid_angle() const { return solid_angle_; }
   /// Standard deviation of a direction in the cone, along one axis: that of a disk of radius
@@ -71,6 +73,8 @@ class SpotEmitter {
 
  private:
   double angle(const Vec3d& v) const;
+  /// Integral of the falloff from the axis to theta, over 2 pi.
+  double integral(double theta) const;
 
   Vec3d position_;
   Vec3d axis_;
@@ -126,6 +130,8 @@ class EnvironmentMap {
 
   /// Draws a direction about in proportion to luminance; u1, u2 in [0, 1).
   Vec3d sample(double u1, double u2) const;
+  /// The inverse of `sample`.
+  Vec2d inverse(const Vec3d& d) const;
   /// Density of `sample` per solid angle; positive wherever `eval` is.
   double pdf(const Vec3d& d) const;
   /// Integral of the luminance over the sphere (as tabulated for sampling).
@@ -134,13 +140,20 @@ class EnvironmentMap {
   double texel_angle() const { return kPi / static_cast<double>(bitmap_.height); }
 
  private:
-  /// Patches of bilinear interpolation, between texel centres: width x (height + 1) of them.
+  /// Patches of bilinear interpolation, between texel centres: width x (height + 1) of them. Where
+  /// one is and where d lies in it, both offsets in [0, 1).
+  struct Place {
+    int row, column;
+    Vec2d offset;
+  };
+  Place place_of(const Vec3d& d) const;
   int row_of(double y) const;
   double patch_solid_angle(int row) const;
 
   Bitmap bitmap_;
   Vec3d axis_x_, axis_y_, axis_z_;  ///< map axes in world space
   double scale_ = 1;
+  std::vector<double> edges_;  ///< cosines with the pole of the edges of the rows, from the top
   DiscreteDistribution rows_;
   std::vector<DiscreteDistribution> columns_;
   double total_ = 0;

@@ -77,6 +77,10 @@ struct RedistributionOptions {
   int chain_length = 100;
   /// Most mutations for each bidirectional sample, in the mean.
   double mutations_per_sample = 4;
+  /// Light subpaths start where a pilot has found that light comes from.
+  bool guide = true;
+  /// Samples of the last round of the pilot, of about twice as many in all.
+  int pilot = 262144;
 };
 
 /// The Langevin sampler of [E63].

@@ -18,6 +18,11 @@ Vec3d square_to_cosine_power(double u1, double u2, double exponent);
 /// Uniform on the unit disk (polar map), density 1 / pi.
 Vec2d square_to_disk(double u1, double u2);
 
+// Their inverses, with values in [0, 1].
+Vec2d sphere_to_square(const Vec3d& v);
+Vec2d cosine_hemisphere_to_square(const Vec3d& v);
+Vec2d disk_to_square(const Vec2d& p);
+
 /// A finite distribution by its cumulative sums.
 class DiscreteDistribution {
  public:
@@ -33,6 +38,10 @@ class DiscreteDistribution {
   }
   /// Draws an index of positive probability and turns u into a fresh number in [0, 1).
   int sample(double& u) const;
+  /// The number that `sample` turns into the index i and a fresh number u.
+  double inverse(int i, double u) const {
+    return cumulative_[static_cast<std::size_t>(i)] + u * probability(i);
+  }
 
  private:
   std::vector<double> cumulative_{0.0};

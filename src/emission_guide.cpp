@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "emission_guide.h"
+
+#include <cmath>
+
+namespace driftlight {
+namespace {
+
+/// Share of the subpaths that are drawn without guidance, so that none is ever much rarer.
+constexpr double kUnguided = 0.2;
+
+}  // namespace
+
+EmissionGuide::EmissionGuide(const Scene& scene) : scene_(&scene) {}
+
+/// An estimate c drawn with the factor g has under emission alone the second moment E[c^2 g]: c g
+/// is what it would have been, with probability 1 / g.
+EmissionGuide::EmissionGuide(const Scene& scene, const std::vector<Record>& records)
+    : scene_(&scene) {
+  const std::size_t count = scene.emitters().size();
+  std::vector<std::vector<CubeRecord>> by_emitter(count);
+  for (const Record& r : records) {
+    const double moment = r.value * r.value * r.density;
+    if (!(moment > 0.0) || !std::isfinite(moment)) continue;
+    CubeRecord& record = by_emitter[r.emitter].emplace_back();
+    for (std::size_t a = 0; a < record.at.size(); ++a)
+      record.at[a] = static_cast<float>(r.sample[a]);
+    record.value = static_cast<float>(moment);
+  }
+  std::vector<double> shares;
+  double total = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    DensityTree tree(by_emitter[i], invertible_axes(scene, i), kUnguided);
+    shares.push_back(tree.mass() * std::sqrt(scene.emitter_probability(i)));
+    total += shares.back();
+    emitters_.push_back({std::move(tree), 1.0});
+  }
+  if (!(total > 0.0)) {
+    emitters_.clear();
+    return;
+  }
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const double p = scene.emitter_probability(i);
+    shares[i] = kUnguided * p + (1.0 - kUnguided) * shares[i] / total;
+    if (p > 0.0) emitters_[i].choice = shares[i] / p;
+  }
+  choice_.emplace(shares);
+}
+
+Emission EmissionGuide::sample(Rng& rng) const {
+  double u = rng.uniform();
+  const Vec2d first = rng.uniform2();
+  const Vec2d last = rng.uniform2();
+  const EmissionSample even{first.x(), first.y(), last.x(), last.y()};
+  if (!choice_) return emit(*scene_, scene_->sample_emitter(u), even);
+  const auto emitter = static_cast<std::uint32_t>(choice_->sample(u));
+  return emit(*scene_, emitter, emitters_[emitter].tree.sample(even));
+}
+
+double EmissionGuide::factor(std::uint32_t emitter, const Vec3d& p, const Vec3d& v) const {
+  if (!choice_) return 1.0;
+  const Learned& learned = emitters_[emitter];
+  if (learned.tree.is_uniform()) return learned.choice;
+  return learned.choice * learned.tree.density(emission_sample(*scene_, emitter, p, v));
+}
+
+}  // namespace driftlight

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Where light that reaches the film is emitted: a density over emitted rays, learned from what a
+/// pilot has found.
+///
+/// Light subpaths are drawn with the density of emission, times a factor that is piecewise constant
+/// over the primary samples of emission.h: guiding in primary sample space (Mueller et al. 2017,
+/// "Practical path guiding", for its trees and for learning in rounds; Guo et al. 2018, "Primary
+/// sample-space path guiding"). A pinhole of light, or a glass in a wide landscape, then gets most
+/// of the subpaths. All densities remain known exactly, so nothing else of an integrator changes.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "density_tree.h"
+#include "emission.h"
+
+namespace driftlight {
+
+class EmissionGuide {
+ public:
+  /// No guidance: rays as the emitters emit them.
+  explicit EmissionGuide(const Scene& scene);
+
+  /// A light subpath of the pilot: its first ray, and what its sample found by way of it.
+  struct Record {
+    std::uint32_t emitter;
+    EmissionSample sample;
+    double value;    ///< luminance over the brightness around
+    double density;  ///< factor with which the ray was drawn
+  };
+  /// Learns from records of a pilot of so many samples.
+  EmissionGuide(const Scene& scene, const std::vector<Record>& records);
+
+  Emission sample(Rng& rng) const;
+  /// Of the ray along v through p, as of emission_sample: its density over that of emission.
+  double factor(std::uint32_t emitter, const Vec3d& p, const Vec3d& v) const;
+  /// Density of the ray from the end along v through p, beyond end.density.
+  double density(const LightEnd& end, const Vec3d& p, const Vec3d& v, double cosine,
+                 double falloff) const {
+    return emission_density(*scene_, end, cosine, falloff) * factor(end.emitter, p, v);
+  }
+  double density(const Emission& ray) const {
+    return density(ray.end, ray.origin, ray.direction, ray.cosine, ray.falloff);
+  }
+
+ private:
+  /// What was learned of an emitter.
+  struct Learned {
+    DensityTree tree;
+    double choice;  ///< its probability over that of emitter sampling
+  };
+
+  const Scene* scene_;
+  std::vector<Learned> emitters_;  ///< none: no guidance
+  std::optional<DiscreteDistribution> choice_;
+};
+
+}  // namespace driftlight
