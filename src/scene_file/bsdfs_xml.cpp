@@ -152,8 +152,8 @@ Surface one_sided(Properties& properties, LoadContext& context) {
   return {Read(properties, context), std::nullopt, std::nullopt};
 }
 
-using Reader = Surface (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, Reader>, 7> kBsdfs{{
+using BsdfReader = Surface (*)(Properties&, LoadContext&);
+constexpr std::array<std::pair<std::string_view, BsdfReader>, 7> kBsdfs{{
     {"diffuse", &one_sided<read_diffuse>},
     {"conductor", &one_sided<read_conductor>},
     {"roughconductor", &one_sided<read_rough_conductor>},

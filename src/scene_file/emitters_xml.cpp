@@ -90,8 +90,8 @@ void reject_area(Properties& properties, LoadContext&) {
   properties.element().fail("an area emitter must be inside of a shape");
 }
 
-using Reader = void (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, Reader>, 6> kEmitters{{
+using EmitterReader = void (*)(Properties&, LoadContext&);
+constexpr std::array<std::pair<std::string_view, EmitterReader>, 6> kEmitters{{
     {"point", &read_point},
     {"spot", &read_spot},
     {"directional", &read_directional},
