@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 
+#include "color_xml.h"
 #include "properties.h"
 #include "refractive_indices.h"
 #include "text.h"
@@ -11,8 +12,6 @@
 
 namespace driftlight {
 namespace {
-
-const Rgbd kWhite{1, 1, 1};
 
 /// Mitsuba's remedy for materials that reflect more than they receive: textures that act together
 /// are scaled so that their maxima sum to 0.99, unless ensureEnergyConservation is false.

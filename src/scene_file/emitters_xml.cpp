@@ -7,13 +7,12 @@
 #include <array>
 #include <cmath>
 
+#include "color_xml.h"
 #include "properties.h"
 #include "textures_xml.h"
 
 namespace driftlight {
 namespace {
-
-const Rgbd kWhite{1, 1, 1};
 
 /// The rotation (or mirror rotation) in a transform that may also scale evenly: a scale means
 /// nothing for directions.
