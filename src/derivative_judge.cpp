@@ -3,13 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 namespace driftlight {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// First steps of Ridders' method, in widths: the wide one drowns rounding, the small ones see past
 /// a kink close by and fit into what is left before an edge.

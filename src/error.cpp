@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "driftlight/error.h"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 namespace driftlight {
 
 std::string to_string(const SourceLocation& location) {
   std::string text = location.file;
-  if (location.line > 0) text += ":" + std::to_string(location.line);
-  if (location.line > 0 && location.column > 0) text += ":" + std::to_string(location.column);
+  if (location.line > 0) text += fmt::format(":{}", location.line);
+  if (location.line > 0 && location.column > 0) text += fmt::format(":{}", location.column);
   return text;
 }
 

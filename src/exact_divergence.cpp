@@ -17,7 +17,7 @@ constexpr int kWidth = 4;
 
 using Inner = ceres::Jet<double, kWidth>;
 using Outer = ceres::Jet<Inner, kWidth>;
-using Segment = Eigen::Matrix<double, kWidth, 1>;
+using InnerPart = Eigen::Matrix<double, kWidth, 1>;
 using BlockMatrix = Eigen::Matrix<double, kWidth, kWidth>;
 /// All coordinates, with zeros up to a whole number of blocks.
 using Padded = Eigen::Matrix<double, kMaxDimension, 1>;
@@ -85,7 +85,7 @@ class HessianSink {
       hessian.row(i) = residual.v[i].v.transpose();
       trace += residual.v[i].v.dot(inverse_.row(i));
     }
-    const Segment y_inner = term.y.segment<kWidth>(inner_);
+    const InnerPart y_inner = term.y.segment<kWidth>(inner_);
     term.hessian_y.segment<kWidth>(outer_) += hessian * y_inner;
     term.trace += trace;
     if (outer_ == 0) term.precision_slope += precision.v.dot(y_inner);

@@ -15,7 +15,6 @@
 namespace driftlight {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// Of gradients, in widths.

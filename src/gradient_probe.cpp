@@ -17,8 +17,11 @@ constexpr double kProbability = 1e-3;
 }  // namespace
 
 GradientProbe::GradientProbe(const Scene& scene, const KernelOptions& options, std::uint64_t seed,
-                             std::uint64_t chain)
-    : scene_(scene), rng_(seed, Stream::GradientCheck, chain), first_index_(chain * kMostChecks) {
+                             std::uint64_t chain, std::uint64_t skip)
+    : scene_(scene),
+      rng_(seed, Stream::GradientCheck, chain),
+      first_index_(chain * kMostChecks),
+      wait_(static_cast<double>(skip)) {
   selection_.gradient = options.drift != Drift::None;
   selection_.constraints = options.preconditioner == PreconditionerKind::Constraints;
   selection_.divergence = selection_.constraints && options.drift == Drift::Full;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 namespace driftlight {
@@ -12,7 +11,6 @@ namespace {
 /// c^2 of T = c L^-T ([E63] section 6).
 constexpr double kC2 = 1.0 / 6.0;
 constexpr double kLogTwoPi = 1.8378770664093454836;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 

@@ -132,7 +132,7 @@ std::optional<int> light_side_of(const Scene& scene, const CameraPart& part, con
 }
 
 /// Where the vertices of a path lie, from x_1 on.
-struct Positions : WalkVisitor<double> {
+struct VertexPositions : WalkVisitor<double> {
   std::array<Vec3d, kMaxPathLength + 1> points;
   int count = 0;
 
@@ -142,7 +142,7 @@ struct Positions : WalkVisitor<double> {
 /// True if the last vertices of the path are those of the light part: then nothing stands in the
 /// way of the connection.
 bool contains(const Scene& scene, const Sample& path, const LightPart& light) {
-  Positions positions;
+  VertexPositions positions;
   walk<double>(scene, path.topology, path.coordinates, positions);
   int k = positions.count;
   const double tolerance = 1e-6 * scene.radius();

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "driftlight/error.h"
@@ -12,6 +13,7 @@
 #include "found_path.h"
 #include "pass_loop.h"
 #include "pilot.h"
+#include "probed_starts.h"
 #include "remainder.h"
 #include "sample_film.h"
 
@@ -36,6 +38,7 @@ struct Redistribution {
   double unit;     ///< bright enough that fixed point does not overflow
   double deposit;  ///< epsilon
   ExactSum remainders;
+  std::optional<ProbedStarts> probed;  ///< if gradients are checked
 
   Redistribution(const Scene& of_scene, const LangevinOptions& with, const RenderOptions& render)
       : scene(of_scene),
@@ -45,7 +48,9 @@ struct Redistribution {
         remainder(scene, pilot.guide, pilot.brightness, options.redistribution.threshold),
         film(scene.camera().film_width, scene.camera().film_height),
         unit(64.0 * pilot.brightness.max()),
-        deposit(kLeastDeposit) {}
+        deposit(kLeastDeposit) {
+    if (render.check_gradients) probed.emplace(scene, options, render.seed);
+  }
 
   /// From the mean remainder of a sample so far.
   void set_deposit(double samples) {
@@ -144,6 +149,10 @@ class RedistributionSampler {
       deposit = start.remainder / (mutations * chains);
     }
     if (!(chains > 0.0)) return;
+    std::optional<GradientProbe> probe =
+        common_.probed ? common_.probed->probe(start.contribution, chains * mutations)
+                       : std::nullopt;
+    chain_.observe(probe ? &*probe : nullptr);
     chain_.start_at(start.topology, start.coordinates, start.contribution, start.share);
     for (double i = 0; i < chains; ++i)
       chain_.run(static_cast<std::uint64_t>(mutations), rng,
@@ -152,6 +161,7 @@ class RedistributionSampler {
                                       weight * deposit * share.brightness / common_.unit);
                  });
     common_.count(chain_.take_statistics());
+    if (probe) common_.probed->take(*probe);
   }
 
   Redistribution& common_;
@@ -173,12 +183,14 @@ LangevinResult render_redistribution(const Scene& scene, const LangevinOptions& 
   const RedistributionSampler sampler(common);
   const PathResult samples =
       run_passes(after_pilot, static_cast<int>(samples_per_pixel), [&](std::uint64_t index) {
+        if (common.probed) common.probed->begin_pass(index);
         film.pass(index, sampler);
         common.set_deposit(static_cast<double>(index + 1) * scene.camera().pixel_count());
       });
 
   LangevinResult result;
   result.statistics = common.statistics();
+  if (common.probed) result.gradient_check = common.probed->table();
   result.image = film.image(samples.samples_per_pixel);
   const Image chains = common.film.develop(common.unit / std::max(1.0, samples.samples_per_pixel));
   for (std::size_t i = 0; i < chains.rgb.size(); ++i) result.image.rgb[i] += chains.rgb[i];

@@ -62,6 +62,9 @@ class RemainderChain {
   void start_at(const PathTopology& topology, const PathCoordinates& coordinates,
                 const Contribution& contribution, const Share& share);
 
+  /// Shows the probe, unless it is null, each state whose step is prepared from now on.
+  void observe(GradientProbe* probe) { small_step_.observe(probe); }
+
   /// Reports visits to splat(share, color, weight): after each mutation both states, with weights
   /// that add up to 1.
   template <class Splat>

@@ -129,7 +129,6 @@ const std::vector<Mistake> kRenderMistakes{
      {"--spp", "redistribution", "--mutations-per-pixel"}},
     {{"scene.xml", "--mutations-per-pixel", "4"},
      {"--mutations-per-pixel", "mode=chain", "redistribution", "--spp"}},
-    {{"scene.xml", "--check-gradients"}, {"--check-gradients", "mode=chain"}},
     {{"scene.xml", "--integrator", "path", "--mutations-per-pixel", "4"},
      {"--mutations-per-pixel", "langevin", "--spp"}},
     {{"scene.xml", "--integrator", "bdpt", "--mutations-per-pixel", "4"},

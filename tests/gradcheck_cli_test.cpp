@@ -223,13 +223,15 @@ TEST_F(GradcheckCli, HelpSucceeds) {
     EXPECT_TRUE(contains(outcome.out, flag)) << flag;
 }
 
-TEST_F(GradcheckCli, CheckingARenderLeavesItsImageAlone) {
+class CheckedRender : public GradcheckCli,
+                      public ::testing::WithParamInterface<std::vector<std::string>> {};
+
+TEST_P(CheckedRender, LeavesItsImageAlone) {
   const auto render = [&](const std::string& name, const char* threads, bool check) {
-    std::vector<std::string> arguments{
-        "render",      "scene.xml", "-o",         name + ".exr", "--mutations-per-pixel",
-        "20",          "--set",     "mode=chain", "--seed",      "3",
-        "-t",          threads,     "--set",      "drift=full",  "--stats",
-        name + ".json"};
+    std::vector<std::string> arguments{"render", "scene.xml",  "-o",      name + ".exr",
+                                       "--seed", "3",          "-t",      threads,
+                                       "--set",  "drift=full", "--stats", name + ".json"};
+    arguments.insert(arguments.end(), GetParam().begin(), GetParam().end());
     if (check) arguments.emplace_back("--check-gradients");
     return run(arguments);
   };
@@ -243,7 +245,7 @@ TEST_F(GradcheckCli, CheckingARenderLeavesItsImageAlone) {
   const auto json = nlohmann::json::parse(read("with.json"));
   const auto& check = json.at("gradient_check");
   EXPECT_EQ(check.at("passed"), true);
-  // The start of each chain at least.
+  // The start of each chain at least, or of many of the short ones.
   EXPECT_GE(check.at("all").at("paths").get<int>(), 100);
   for (const char* quantity :
        {"gradient_hand", "gradient_ridders", "jacobian_ridders", "divergence"})
@@ -254,6 +256,17 @@ TEST_F(GradcheckCli, CheckingARenderLeavesItsImageAlone) {
   EXPECT_TRUE(read("with.exr") == read("alone.exr"));
   EXPECT_EQ(nlohmann::json::parse(read("alone.json")).at("gradient_check"), check);
 }
+
+/// In Mode::Redistribution with many short chains.
+INSTANTIATE_TEST_SUITE_P(Modes, CheckedRender,
+                         ::testing::Values(std::vector<std::string>{"--set", "mode=chain",
+                                                                    "--mutations-per-pixel", "20"},
+                                           std::vector<std::string>{"--set", "threshold=0.2",
+                                                                    "--set", "chain_length=4",
+                                                                    "--spp", "8"}),
+                         [](const auto& instance) {
+                           return std::string(instance.index == 0 ? "chain" : "redistribution");
+                         });
 
 TEST_F(GradcheckCli, RendersThatUseNoDerivativesCannotBeChecked) {
   for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{

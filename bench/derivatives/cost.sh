@@ -18,7 +18,7 @@ trap 'rm -rf "$work"' EXIT
 # The compiler's command for a source, without ccache and without its output.
 command_for() {
   grep -B1 -F "\"file\": \"$root/$1\"" "$commands" | sed -n 's/^ *"command": "\(.*\)",$/\1/p' |
-    sed -e 's/\\\(.\)/\1/g' -e 's/^[^ ]*ccache //' -e 's/ -o [^ ]*//'
+    sed -e 's/\\\(.\)/\1/g' -e 's/^.*ccache //' -e 's/ -o [^ ]*//'
 }
 
 # row NAME SOURCE [TEXT]: a row for the source, or for TEXT compiled in its stead.

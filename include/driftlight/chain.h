@@ -19,7 +19,7 @@ class Chain {
         const PathSampler::Sample& start, Rng rng, StepLayers* layers = nullptr);
 
   /// Shows the probe each state whose step is prepared from now on.
-  void observe(GradientProbe& probe) { small_step_.observe(probe); }
+  void observe(GradientProbe& probe) { small_step_.observe(&probe); }
 
   /// Runs mutations, each splatting both states with weights 1 - a and a.
   void run(std::uint64_t mutations);

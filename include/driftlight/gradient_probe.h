@@ -10,15 +10,15 @@
 
 namespace driftlight {
 
-/// Looks at the states of one chain: the first one, then about one in a thousand, 32 at most. It
-/// changes nothing of the chain and has random numbers of its own.
+/// Looks at the states of one chain: the first one, or the one after so many, then about one in a
+/// thousand, 32 at most. It changes nothing of the chain and has random numbers of its own.
 class GradientProbe {
  public:
   /// Checks what a kernel with these options uses: the gradient if there is a drift, the residual
   /// Jacobians if they precondition it, the divergence if it is part of the drift, and derivatives
   /// by hand if the method is.
   GradientProbe(const Scene& scene, const KernelOptions& options, std::uint64_t seed,
-                std::uint64_t chain);
+                std::uint64_t chain, std::uint64_t skip = 0);
 
   /// To be called with each state whose step has been prepared. States that carry no light count
   /// for nothing.
@@ -33,7 +33,7 @@ class GradientProbe {
   DerivativeFunctions functions_;
   Rng rng_;
   std::uint64_t first_index_;
-  double wait_ = 0;  ///< states to let pass before the next check
+  double wait_;  ///< states to let pass before the next check
   std::vector<CheckedPath> paths_;
 };
 

@@ -9,6 +9,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <concepts>
+#include <limits>
 
 namespace driftlight {
 
@@ -53,6 +54,7 @@ using Rgbd = Rgb<double>;
 
 inline constexpr double kPi = 3.14159265358979323846;
 inline constexpr double kInvPi = 1.0 / kPi;
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// The number behind every level of differentiation.
 constexpr double value(double x) { return x; }

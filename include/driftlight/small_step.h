@@ -47,8 +47,8 @@ class SmallStep {
  public:
   SmallStep(const Scene& scene, const KernelOptions& options) : scene_(scene), options_(options) {}
 
-  /// Shows the probe each state whose step is prepared from now on.
-  void observe(GradientProbe& probe) { probe_ = &probe; }
+  /// Shows the probe, unless it is null, each state whose step is prepared from now on.
+  void observe(GradientProbe* probe) { probe_ = probe; }
 
   /// Draws a step from `from` and traces and evaluates where it leads; what makes it fail is
   /// counted.

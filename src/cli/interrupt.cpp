@@ -7,11 +7,11 @@ namespace driftlight::cli {
 
 namespace {
 
-constinit std::atomic<bool> stop{false};
+constinit std::atomic<bool> interrupted{false};
 static_assert(std::atomic<bool>::is_always_lock_free);
 
 extern "C" void on_signal(int /*signal*/) {
-  stop.store(true);
+  interrupted.store(true);
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
 }
@@ -25,7 +25,7 @@ const std::atomic<bool>& stop_on_interrupt() {
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
-  return stop;
+  return interrupted;
 }
 
 }  // namespace driftlight::cli

@@ -21,7 +21,7 @@ std::string clock_text(double seconds) {
   return hours > 0 ? fmt::format("{}:{}", hours, rest) : rest;
 }
 
-void print(const std::string& text) {
+void draw(const std::string& text) {
   std::fputs(text.c_str(), stderr);
   std::fflush(stderr);
 }
@@ -31,7 +31,7 @@ void print(const std::string& text) {
 ProgressBar::ProgressBar(bool wanted) : shown_(wanted && ::isatty(STDERR_FILENO) == 1) {}
 
 ProgressBar::~ProgressBar() {
-  if (shown_) print("\r\033[K");
+  if (shown_) draw("\r\033[K");
 }
 
 void ProgressBar::update(const Progress& progress) {
@@ -45,8 +45,8 @@ void ProgressBar::update(const Progress& progress) {
   const std::string left = fraction > 0.0
                                ? clock_text(progress.elapsed * (1.0 - fraction) / fraction)
                                : std::string("--:--");
-  print(fmt::format("\r[{:=>{}}{:{}}] {:3.0f} %  {} left\033[K", "", filled, "", kWidth - filled,
-                    100.0 * fraction, left));
+  draw(fmt::format("\r[{:=>{}}{:{}}] {:3.0f} %  {} left\033[K", "", filled, "", kWidth - filled,
+                   100.0 * fraction, left));
 }
 
 }  // namespace driftlight::cli

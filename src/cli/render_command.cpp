@@ -123,7 +123,6 @@ void check_settings(const RenderCommand& command, const Options& options) {
           "mode=chain takes --mutations-per-pixel");
     if (!chain && command.mutations_per_pixel)
       throw UsageError("--mutations-per-pixel is for mode=chain; mode=redistribution takes --spp");
-    if (!chain && command.check_gradients) throw UsageError("--check-gradients is for mode=chain");
     const KernelOptions& kernel = options.kernel;
     if (command.check_gradients && kernel.drift == Drift::None &&
         kernel.preconditioner == PreconditionerKind::Identity)

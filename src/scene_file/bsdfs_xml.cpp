@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 
+#include "color_xml.h"
 #include "properties.h"
 #include "refractive_indices.h"
 #include "text.h"
@@ -11,8 +12,6 @@
 
 namespace driftlight {
 namespace {
-
-const Rgbd kWhite{1, 1, 1};
 
 /// Mitsuba's remedy for materials that reflect more than they receive: textures that act together
 /// are scaled so that their maxima sum to 0.99, unless ensureEnergyConservation is false.
@@ -152,8 +151,8 @@ Surface one_sided(Properties& properties, LoadContext& context) {
   return {Read(properties, context), std::nullopt, std::nullopt};
 }
 
-using Reader = Surface (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, Reader>, 7> kBsdfs{{
+using BsdfReader = Surface (*)(Properties&, LoadContext&);
+constexpr std::array<std::pair<std::string_view, BsdfReader>, 7> kBsdfs{{
     {"diffuse", &one_sided<read_diffuse>},
     {"conductor", &one_sided<read_conductor>},
     {"roughconductor", &one_sided<read_rough_conductor>},

@@ -7,6 +7,8 @@
 
 namespace driftlight {
 
+inline const Rgbd kWhite{1, 1, 1};
+
 /// Linear sRGB of <rgb> or <srgb> (one value, three values or #rrggbb) or of <spectrum> (one value,
 /// three values, or a list "wavelength:value, ..", nm). Throws SceneError on negative values.
 Rgbd read_color(const Element& element);

@@ -7,13 +7,12 @@
 #include <array>
 #include <cmath>
 
+#include "color_xml.h"
 #include "properties.h"
 #include "textures_xml.h"
 
 namespace driftlight {
 namespace {
-
-const Rgbd kWhite{1, 1, 1};
 
 /// The rotation (or mirror rotation) in a transform that may also scale evenly: a scale means
 /// nothing for directions.
@@ -90,8 +89,8 @@ void reject_area(Properties& properties, LoadContext&) {
   properties.element().fail("an area emitter must be inside of a shape");
 }
 
-using Reader = void (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, Reader>, 6> kEmitters{{
+using EmitterReader = void (*)(Properties&, LoadContext&);
+constexpr std::array<std::pair<std::string_view, EmitterReader>, 6> kEmitters{{
     {"point", &read_point},
     {"spot", &read_spot},
     {"directional", &read_directional},

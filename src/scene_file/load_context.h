@@ -2,6 +2,8 @@
 /// What the readers of a scene share.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -39,7 +41,7 @@ class NamedObjects {
   template <class T>
   T resolve(const Element& ref, const std::string& kind) const {
     const T* const object = std::get_if<T>(&find(ref));
-    if (!object) ref.fail("'" + ref.text("id") + "' is not a " + kind);
+    if (!object) ref.fail(fmt::format("'{}' is not a {}", ref.text("id"), kind));
     return *object;
   }
 

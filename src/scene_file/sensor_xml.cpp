@@ -138,8 +138,8 @@ PerspectiveCamera read_perspective(Properties& sensor, LoadContext& context) {
   return camera;
 }
 
-using Reader = PerspectiveCamera (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, Reader>, 1> kSensors{
+using SensorReader = PerspectiveCamera (*)(Properties&, LoadContext&);
+constexpr std::array<std::pair<std::string_view, SensorReader>, 1> kSensors{
     {{"perspective", &read_perspective}}};
 
 }  // namespace

@@ -150,8 +150,8 @@ std::vector<Geometry> read_serialized_shape(Properties& properties, LoadContext&
   return {std::move(mesh)};
 }
 
-using Reader = std::vector<Geometry> (*)(Properties&, LoadContext&, const Attachments&);
-constexpr std::array<std::pair<std::string_view, Reader>, 6> kShapes{{
+using ShapeReader = std::vector<Geometry> (*)(Properties&, LoadContext&, const Attachments&);
+constexpr std::array<std::pair<std::string_view, ShapeReader>, 6> kShapes{{
     {"rectangle", &read_rectangle},
     {"cube", &read_cube},
     {"sphere", &read_sphere},
@@ -186,7 +186,7 @@ std::shared_ptr<Surface> default_surface(const Attachments& attachments) {
 
 void read_shape(const Element& element, LoadContext& context) {
   Properties properties(element);
-  const Reader reader = find_plugin(kShapes, properties);
+  const ShapeReader reader = find_plugin(kShapes, properties);
   Attachments attachments = read_attachments(properties, context);
   std::vector<Geometry> geometries = reader(properties, context, attachments);
   properties.finish();

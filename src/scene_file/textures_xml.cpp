@@ -35,8 +35,8 @@ Texture read_bitmap_texture(Properties& properties, LoadContext& context) {
   return texture;
 }
 
-using Reader = Texture (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, Reader>, 1> kTextures{
+using TextureReader = Texture (*)(Properties&, LoadContext&);
+constexpr std::array<std::pair<std::string_view, TextureReader>, 1> kTextures{
     {{"bitmap", &read_bitmap_texture}}};
 
 }  // namespace

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <filesystem>
@@ -13,13 +14,14 @@
 
 namespace driftlight::test {
 
-/// A directory for the files of one test, removed afterwards.
+/// A directory for the files of one test in one process, removed afterwards.
 class SceneDirectory {
  public:
   SceneDirectory() {
     static std::atomic<int> count{0};
     const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    std::string name = std::string("driftlight_") + info->test_suite_name() + "_" + info->name();
+    std::string name = "driftlight_" + std::to_string(::getpid()) + "_" + info->test_suite_name() +
+                       "_" + info->name() + "_";
     for (char& c : name)
       if (c == '/') c = '_';
     path_ = std::filesystem::path(::testing::TempDir()) / (name + std::to_string(count++));
