@@ -80,7 +80,7 @@ struct RedistributionOptions {
   /// Light subpaths start where a pilot has found that light comes from.
   bool guide = true;
   /// Samples of the last round of the pilot, of about twice as many in all.
-  int pilot = 262144;
+  int pilot = 65536;
 };
 
 /// The Langevin sampler of [E63].
