@@ -28,7 +28,7 @@ struct Box {
 
 double sum_of(std::span<const CubeRecord> records) {
   double sum = 0;
-  for (const CubeRecord& r : records) sum += static_cast<double>(r.value);
+  for (const CubeRecord& r : records) sum += static_cast<double>(r.moment);
   return sum;
 }
 
@@ -74,7 +74,7 @@ class DensityTree::Builder {
       for (const CubeRecord& r : records) {
         const float x = (r.at[a] - box.low[a]) / box.size[a];
         const int bin = std::clamp(static_cast<int>(x * kBins), 0, kBins - 1);
-        bins[static_cast<std::size_t>(bin)] += static_cast<double>(r.value);
+        bins[static_cast<std::size_t>(bin)] += static_cast<double>(r.moment);
       }
       double mass = 0;
       for (const double b : bins) mass += std::sqrt(box.volume() / kBins * b);

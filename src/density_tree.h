@@ -10,10 +10,10 @@
 
 namespace driftlight {
 
-/// A point of the unit cube and how much was found there.
+/// A point of the unit cube, drawn with the density g, where an estimator had the value c.
 struct CubeRecord {
   std::array<float, 4> at;
-  float value;  ///< of an estimator: value * (density it was drawn with) is an unbiased weight
+  float moment;  ///< c^2 g: sums of it over a box estimate the integral of the second moment there
 };
 
 class DensityTree {
@@ -23,10 +23,9 @@ class DensityTree {
 
   /// 1 everywhere.
   DensityTree() : nodes_(1) {}
-  /// From records of estimates c that were drawn with the density `drawn` on the cube. Least
-  /// variance asks for a density in proportion to the root of the second moment; a fraction
-  /// `uniform` of it stays spread evenly. Only the given axes are told apart; records are
-  /// reordered.
+  /// In proportion to the root of the second moment, which is the density of least variance; a
+  /// fraction `uniform` of it stays spread evenly. Only the given axes are told apart. The records
+  /// are reordered.
   DensityTree(std::vector<CubeRecord>& records, const Axes& axes, double uniform);
 
   bool is_uniform() const { return nodes_.size() == 1; }
@@ -34,7 +33,7 @@ class DensityTree {
   double density(const Point& point) const;
   /// Turns uniform numbers into a point of this density.
   Point sample(Point u) const;
-  /// Sum of the roots of second moments over the leaves, before normalisation.
+  /// The integral of the root of the second moment, before normalisation.
   double mass() const { return mass_; }
 
  private:

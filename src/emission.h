@@ -8,8 +8,8 @@
 
 namespace driftlight {
 
-/// Numbers in [0, 1) that an emitted ray is drawn from (a primary sample). The map to rays has a
-/// constant density in the measure of emission_density:
+/// Numbers in [0, 1) that an emitted ray is drawn from (a primary sample); uniform ones make rays
+/// of the density end.density * emission_density.
 ///
 ///   emitter                  first two                 last two
 ///   planar area              point on it               direction, by the cosine about the normal
@@ -35,7 +35,7 @@ struct Emission {
   double falloff;  ///< of `end.emitted`, along the direction
 };
 
-/// The ray of the emitter that a sample makes; its density is end.density * emission_density.
+/// The ray of the emitter that a sample makes.
 Emission emit(const Scene& scene, std::uint32_t emitter, const EmissionSample& sample);
 
 /// The sample of a ray along the unit direction v through p, a point on a finite emitter or any

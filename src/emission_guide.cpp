@@ -13,19 +13,19 @@ constexpr double kUnguided = 0.2;
 
 EmissionGuide::EmissionGuide(const Scene& scene) : scene_(&scene) {}
 
-/// An estimate c drawn with the factor g has under emission alone the second moment E[c^2 g]: c g
-/// is what it would have been, with probability 1 / g.
+/// Under emission alone an estimate c that was drawn with the factor g would have been c g, with
+/// probability 1 / g: its second moment is c^2 g.
 EmissionGuide::EmissionGuide(const Scene& scene, const std::vector<Record>& records)
     : scene_(&scene) {
   const std::size_t count = scene.emitters().size();
   std::vector<std::vector<CubeRecord>> by_emitter(count);
   for (const Record& r : records) {
-    const double moment = r.value * r.value * r.density;
+    const double moment = r.value * r.value * r.factor;
     if (!(moment > 0.0) || !std::isfinite(moment)) continue;
     CubeRecord& record = by_emitter[r.emitter].emplace_back();
     for (std::size_t a = 0; a < record.at.size(); ++a)
       record.at[a] = static_cast<float>(r.sample[a]);
-    record.value = static_cast<float>(moment);
+    record.moment = static_cast<float>(moment);
   }
   std::vector<double> shares;
   double total = 0;

@@ -3,10 +3,10 @@
 /// pilot has found.
 ///
 /// Light subpaths are drawn with the density of emission, times a factor that is piecewise constant
-/// over the primary samples of emission.h: guiding in primary sample space (Mueller et al. 2017,
-/// "Practical path guiding", for its trees and for learning in rounds; Guo et al. 2018, "Primary
-/// sample-space path guiding"). A pinhole of light, or a glass in a wide landscape, then gets most
-/// of the subpaths. All densities remain known exactly, so nothing else of an integrator changes.
+/// over the primary samples of emission.h (Guo et al. 2018, "Primary sample space path guiding";
+/// the tree and its rounds of learning as in Mueller et al. 2017, "Practical path guiding"). An
+/// opening, or a glass in a wide landscape, then gets most of the subpaths. All densities remain
+/// exact.
 #pragma once
 
 #include <optional>
@@ -26,10 +26,10 @@ class EmissionGuide {
   struct Record {
     std::uint32_t emitter;
     EmissionSample sample;
-    double value;    ///< luminance over the brightness around
-    double density;  ///< factor with which the ray was drawn
+    double value;   ///< luminance over the brightness around
+    double factor;  ///< with which the ray was drawn
   };
-  /// Learns from records of a pilot of so many samples.
+  /// With no record of light it guides nothing.
   EmissionGuide(const Scene& scene, const std::vector<Record>& records);
 
   Emission sample(Rng& rng) const;

@@ -89,7 +89,7 @@ DensityTree tree_about(double center, double half) {
       r.at[a] = static_cast<float>(rng.uniform());
       inside = inside && (a == 3 || std::abs(static_cast<double>(r.at[a]) - center) < half);
     }
-    r.value = inside ? 1.0F : 0.001F;
+    r.moment = inside ? 1.0F : 0.001F;
     records.push_back(r);
   }
   return DensityTree(records, {true, true, true, true}, 0.2);
