@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "driftlight/running_mean.h"
-#include "pilot.h"
 #include "support/chi_square.h"
+#include "support/learned_guide.h"
 #include "support/t_test.h"
 #include "support/test_scenes.h"
 
@@ -130,10 +130,7 @@ TEST(DensityTree, IsUniformWithoutRecords) {
 TEST(EmissionGuide, FactorsAverageToOne) {
   for (const TestScene& test : test_scenes()) {
     SCOPED_TRACE(test.name);
-    LangevinOptions options;
-    options.max_depth = test.max_depth;
-    options.redistribution.pilot = 8192;
-    const EmissionGuide guide = run_pilot(test.scene, options, 1).guide;
+    const EmissionGuide guide = learned_guide(test);
     const EmissionGuide unguided(test.scene);
     Rng rng(306, Stream::Test, 0);
     RunningMean mean;

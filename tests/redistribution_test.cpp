@@ -9,8 +9,8 @@
 #include "brightness_map.h"
 #include "driftlight/render.h"
 #include "found_path.h"
-#include "pilot.h"
 #include "remainder.h"
+#include "support/learned_guide.h"
 #include "support/test_scenes.h"
 
 namespace driftlight::test {
@@ -50,10 +50,7 @@ TEST(FoundPath, ItsValueIsContributionOverDensity) {
   for (const TestScene& test : test_scenes()) {
     SCOPED_TRACE(test.name);
     // Guided, so that no density is as it was.
-    LangevinOptions options;
-    options.max_depth = test.max_depth;
-    options.redistribution.pilot = 8192;
-    const EmissionGuide guide = run_pilot(test.scene, options, 1).guide;
+    const EmissionGuide guide = learned_guide(test);
     const Remainder remainder(test.scene, guide, flat, 1.0);
     BidirectionalTracer tracer(test.scene, guide, MisHeuristic::Balance, test.max_depth);
     ComparingSink sink{test.scene, remainder, {}};

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "pilot.h"
+#include "support/learned_guide.h"
 #include "support/test_scenes.h"
 
 namespace driftlight::test {
@@ -272,10 +272,7 @@ template <class Visit>
 Coverage for_random_paths(const Visit& visit) {
   Coverage seen;
   for (const TestScene& test : test_scenes()) {
-    LangevinOptions options;
-    options.max_depth = test.max_depth;
-    options.redistribution.pilot = 8192;
-    const EmissionGuide guide = run_pilot(test.scene, options, 1).guide;
+    const EmissionGuide guide = learned_guide(test);
     for (std::uint64_t i = 0; i < 5000; ++i) {
       Rng rng(211, Stream::Test, i);
       const auto path = draw_path(test, rng);
