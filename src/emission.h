@@ -23,7 +23,7 @@ using EmissionSample = std::array<double, 4>;
 /// Which of them have an inverse: a point on a mesh has none, and nothing of a mesh that is not
 /// planar.
 using EmissionAxes = std::array<bool, 4>;
-EmissionAxes invertible_axes(const Scene& scene, std::uint32_t emitter);
+EmissionAxes invertible_axes(const Scene& scene, std::uint32_t index);
 
 /// A ray that leaves a light end.
 struct Emission {
@@ -35,12 +35,12 @@ struct Emission {
   double falloff;  ///< of `end.emitted`, along the direction
 };
 
-/// The ray of the emitter that a sample makes.
-Emission emit(const Scene& scene, std::uint32_t emitter, const EmissionSample& sample);
+/// The ray that a sample makes of the emitter of this index.
+Emission emit(const Scene& scene, std::uint32_t index, const EmissionSample& u);
 
 /// The sample of a ray along the unit direction v through p, a point on a finite emitter or any
 /// point of the ray of one at infinity; 0 on axes without an inverse.
-EmissionSample emission_sample(const Scene& scene, std::uint32_t emitter, const Vec3d& p,
+EmissionSample emission_sample(const Scene& scene, std::uint32_t index, const Vec3d& p,
                                const Vec3d& v);
 
 /// Density of the ray that leaves the end, for a cosine > 0 with its normal:

@@ -36,10 +36,10 @@ struct LightEnd {
 
 /// Draws an emitter and a point on it.
 LightEnd sample_light_end(const Scene& scene, Rng& rng);
-/// The point of a given emitter that a point of the unit square makes.
-LightEnd light_end_from(const Scene& scene, std::uint32_t emitter, const Vec2d& square);
-/// A given point on an area emitter.
-LightEnd area_end(const Scene& scene, std::uint32_t emitter, const EmitterPoint& y);
+/// The point of the emitter of this index that a point of the unit square makes.
+LightEnd light_end_from(const Scene& scene, std::uint32_t index, const Vec2d& square);
+/// A given point on the area emitter of this index.
+LightEnd area_end(const Scene& scene, std::uint32_t index, const EmitterPoint& y);
 /// The end of a ray that has come to the surface; none if nothing is emitted toward it.
 std::optional<LightEnd> light_end_at(const Scene& scene, const SurfaceHit& surface);
 /// The end of a ray that leaves the scene; none without an environment.
