@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "environment_precision.h"
+
 namespace driftlight {
 
 // ---- SpotEmitter ----------------------------------------------------------------------------
@@ -86,6 +88,7 @@ Vec2d SpotEmitter::inverse(const Vec3d& v) const {
 
 EnvironmentMap::EnvironmentMap(Bitmap bitmap, const Eigen::Matrix3d& to_world, double scale)
     : bitmap_(std::move(bitmap)),
+      precision_(environment_precision(bitmap_)),
       axis_x_(to_world.col(0)),
       axis_y_(to_world.col(1)),
       axis_z_(to_world.col(2)),

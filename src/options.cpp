@@ -65,12 +65,13 @@ OptionEntry number(std::string_view name, T& field, const Range<T>& range, std::
 }
 
 /// A number, or none by the word auto.
-OptionEntry number_or_auto(std::string_view name, std::optional<double>& field,
-                           const Range<double>& range, std::string_view help) {
+template <class T>
+OptionEntry number_or_auto(std::string_view name, std::optional<T>& field, const Range<T>& range,
+                           std::string_view help) {
   const std::string values = "auto or " + describe(range);
   return {name, values, help, [&field] { return field ? fmt::format("{}", *field) : "auto"; },
           [&field, name, range, values](const std::string& text) {
-            const std::optional<double> x = parse<double>(text);
+            const std::optional<T> x = parse<T>(text);
             if (text != "auto" && (!x || !range.contains(*x))) fail(name, text, values);
             field = x;
           }};
@@ -110,9 +111,13 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
   const Range<double> positive{.low = 0, .open = true};
   KernelOptions& kernel = options.kernel;
   RedistributionOptions& redistribution = options.redistribution;
+  SplittingOptions& splitting = options.splitting;
   return {
-      choice("mode", options.mode, std::array<std::string_view, 2>{"chain", "redistribution"},
-             "who carries light: chains, or samples whose rare heavy ones chains spread"),
+      choice(
+          "mode", options.mode,
+          std::array<std::string_view, 3>{"chain", "redistribution", "splitting"},
+          "who carries light: chains; samples whose rare heavy ones chains spread; or these, and "
+          "particles that softer versions of the scene lead to what is too rare"),
       choice("phase_space", options.phase_space, kPhaseSpaces,
              "coordinates of a path: directions from the sensor, or from both ends"),
       choice("drift", kernel.drift, kDrifts,
@@ -145,6 +150,16 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
              "redistribution: light subpaths start where a pilot has found that light comes from"),
       number("pilot", redistribution.pilot, Range<int>{256, 1000000000},
              "redistribution: samples of the pilot's last round"),
+      choice("split", splitting.all, std::array<std::string_view, 2>{"auto", "all"},
+             "splitting: carries what a pilot finds it better for, or all that samples leave"),
+      number_or_auto("levels", splitting.levels, Range<int>{0, 32},
+                     "splitting: softer versions of the scene; 0: none, auto: as it needs"),
+      number("level_steps", splitting.steps, Range<int>{0, 1000000},
+             "splitting: steps of a particle at each softer level"),
+      number("last_steps", splitting.last_steps, Range<int>{1, 1000000},
+             "splitting: steps of a particle in the scene itself"),
+      number("splitting_pilot", splitting.pilot, Range<int>{64, 1000000000},
+             "splitting: samples of each round of its pilot"),
       number("chains", options.chains, Range<int>{1, 1000000},
              "independent chains; the image depends on it, not on the threads"),
       number("bootstrap", options.bootstrap, Range<int>{1, 1000000000},

@@ -16,6 +16,7 @@
 #include "probed_starts.h"
 #include "remainder.h"
 #include "sample_film.h"
+#include "splitting_pilot.h"
 
 namespace driftlight {
 namespace {
@@ -34,11 +35,15 @@ struct Redistribution {
   StepLayers* layers;
   Pilot pilot;
   Remainder remainder;
-  Film film;       ///< of the chains, in units of `unit`
-  double unit;     ///< bright enough that fixed point does not overflow
-  double deposit;  ///< epsilon
+  Film film;        ///< of the chains, in units of `unit`
+  Film split_film;  ///< of the particles, likewise
+  double unit;      ///< bright enough that fixed point does not overflow
+  double deposit;   ///< epsilon
   ExactSum remainders;
   std::optional<ProbedStarts> probed;  ///< if gradients are checked
+  TemperedScenes levels;
+  EmissionGuide top_guide;
+  SplittingPlan plan;
 
   Redistribution(const Scene& of_scene, const LangevinOptions& with, const RenderOptions& render)
       : scene(of_scene),
@@ -47,9 +52,18 @@ struct Redistribution {
         pilot(run_pilot(scene, options, render.seed)),
         remainder(scene, pilot.guide, pilot.brightness, options.redistribution.threshold),
         film(scene.camera().film_width, scene.camera().film_height),
+        split_film(scene.camera().film_width, scene.camera().film_height),
         unit(64.0 * pilot.brightness.max()),
-        deposit(kLeastDeposit) {
+        deposit(kLeastDeposit),
+        levels(scene,
+               options.mode == Mode::Splitting ? options.splitting.levels : std::optional(0)),
+        top_guide(levels[levels.top()]) {
     if (render.check_gradients) probed.emplace(scene, options, render.seed);
+    if (levels.top() > 0) plan = plan_splitting(splitter(), options, render.seed);
+  }
+
+  Splitter splitter() const {
+    return {levels, top_guide, options, remainder, pilot.brightness, layers};
   }
 
   /// From the mean remainder of a sample so far.
@@ -65,15 +79,34 @@ struct Redistribution {
     statistics_.rejections += figures.rejections;
     ++statistics_.starts;
   }
+  /// What the particles of one sample have brought, in units of the brightness about.
+  void count_family(double sum, const std::vector<LevelFigures>& figures) {
+    families_.add(sum / plan.deposit);
+    squared_families_.add(sum * sum / (plan.deposit * plan.deposit));
+    const std::lock_guard lock(mutex_);
+    statistics_.levels.resize(std::max(statistics_.levels.size(), figures.size()));
+    for (std::size_t k = 0; k < figures.size(); ++k) statistics_.levels[k] += figures[k];
+  }
   LangevinStatistics statistics() const {
     LangevinStatistics result = statistics_;
-    result.mutations = result.small_step.proposed;
     result.small_step.accepted = accepted_.value();
+    for (const LevelFigures& level : result.levels) {
+      result.small_step += level.steps;
+      result.rejections += level.rejections;
+    }
+    result.mutations = result.small_step.proposed;
+    if (!plan.takes_any()) return result;
+    result.split_deposit = plan.deposit;
+    result.split_sequences = plan.sequences.size();
+    const double sum = families_.value();
+    if (sum > 0.0) result.effective_families = sum * sum / squared_families_.value();
     return result;
   }
 
  private:
   ExactSum accepted_;
+  ExactSum families_;  ///< in particles
+  ExactSum squared_families_;
   std::mutex mutex_;
   LangevinStatistics statistics_;
 };
@@ -84,13 +117,15 @@ class RedistributionSampler {
   explicit RedistributionSampler(Redistribution& common)
       : common_(common),
         tracer_(common.scene, common.pilot.guide, MisHeuristic::Balance, common.options.max_depth),
-        chain_(common.scene, common.options.kernel, common.remainder, common.layers) {}
+        chain_(common.scene, common.options.kernel, common.remainder, common.layers),
+        splitter_(common.splitter()) {}
 
   void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& film_sink) {
     starts_.clear();
     Sink sink{*this, film, film_sink};
     tracer_.sample(film, rng, sink);
     for (const Start& start : starts_) spread(start, rng);
+    if (common_.plan.takes_any()) split(film, rng);
   }
 
  private:
@@ -130,7 +165,7 @@ class RedistributionSampler {
     start.share = common_.remainder.share(start.topology, start.coordinates, start.contribution);
     if (!std::isfinite(start.share.log_remainder)) return 1.0;
     start.remainder = path.roulette * (start.share.w - tau);
-    starts_.push_back(start);
+    if (!common_.plan.takes(LobeSequence(start.topology))) starts_.push_back(start);
     return tau / start.share.w;
   }
 
@@ -164,9 +199,22 @@ class RedistributionSampler {
     if (probe) common_.probed->take(*probe);
   }
 
+  /// The remainder that is left to splitting.
+  void split(const Vec2d& film, Rng& rng) {
+    double family = 0.0;
+    splitter_.sample(film, common_.plan, rng,
+                     [&](LobeSequence, const Share& share, const Rgbd& color, double amount) {
+                       family += amount;
+                       common_.split_film.splat(share.film, color,
+                                                amount * share.brightness / common_.unit);
+                     });
+    common_.count_family(family, splitter_.take_figures());
+  }
+
   Redistribution& common_;
   BidirectionalTracer tracer_;
   RemainderChain chain_;
+  Splitter splitter_;
   std::vector<Start> starts_;
 };
 
@@ -192,12 +240,16 @@ LangevinResult render_redistribution(const Scene& scene, const LangevinOptions& 
   result.statistics = common.statistics();
   if (common.probed) result.gradient_check = common.probed->table();
   result.image = film.image(samples.samples_per_pixel);
-  const Image chains = common.film.develop(common.unit / std::max(1.0, samples.samples_per_pixel));
-  for (std::size_t i = 0; i < chains.rgb.size(); ++i) result.image.rgb[i] += chains.rgb[i];
+  const double unit = common.unit / std::max(1.0, samples.samples_per_pixel);
+  const Image chains = common.film.develop(unit);
+  const Image particles = common.split_film.develop(unit);
+  for (std::size_t i = 0; i < chains.rgb.size(); ++i)
+    result.image.rgb[i] += chains.rgb[i] + particles.rgb[i];
   result.statistics.b = mean_luminance(result.image);
   if (!(result.statistics.b > 0.0) && !samples.stopped)
     throw InputError("no path from the sensor to an emitter carries light");
   result.statistics.remainder = mean_luminance(chains);
+  result.statistics.split = mean_luminance(particles);
   result.statistics.samples_per_pixel = samples.samples_per_pixel;
   result.statistics.stopped = samples.stopped;
   result.statistics.bootstrap_seconds = pilot_seconds;

@@ -35,6 +35,14 @@ KernelStatistics& KernelStatistics::operator+=(const KernelStatistics& other) {
   return *this;
 }
 
+LevelFigures& LevelFigures::operator+=(const LevelFigures& other) {
+  particles += other.particles;
+  died += other.died;
+  steps += other.steps;
+  rejections += other.rejections;
+  return *this;
+}
+
 LangevinStatistics& LangevinStatistics::operator+=(const LangevinStatistics& other) {
   large_step += other.large_step;
   small_step += other.small_step;

@@ -329,6 +329,15 @@ EmitterPoint Scene::sample_area(const AreaEmitter& emitter, double u1, double u2
 
 // ---- SceneBuilder ---------------------------------------------------------------------------
 
+SceneBuilder::SceneBuilder(const Scene& scene) {
+  scene_.camera_ = scene.camera_;
+  scene_.shapes_ = scene.shapes_;
+  scene_.materials_ = scene.materials_;
+  scene_.bsdfs_ = scene.bsdfs_;
+  scene_.emitters_ = scene.emitters_;
+  scene_.environment_ = scene.environment_;
+}
+
 std::uint32_t SceneBuilder::add_bsdf(Bsdf bsdf) {
   scene_.bsdfs_.push_back(std::move(bsdf));
   return static_cast<std::uint32_t>(scene_.bsdfs_.size() - 1);
@@ -375,6 +384,14 @@ void SceneBuilder::set_environment(Emitter environment) {
 }
 
 void SceneBuilder::set_camera(const PerspectiveCamera& camera) { scene_.camera_ = camera; }
+
+void SceneBuilder::replace_bsdf(std::uint32_t index, Bsdf bsdf) {
+  scene_.bsdfs_.at(index) = std::move(bsdf);
+}
+
+void SceneBuilder::replace_environment(Emitter environment) {
+  scene_.emitters_.at(scene_.environment_.value()) = std::move(environment);
+}
 
 namespace {
 

@@ -35,7 +35,8 @@ const std::map<std::string, Work>& works() {
       {"glossy_chain", {600, 300, 400000, 0.12}},
       {"door_ajar", {200, 150, 200000, 0.12}},
       {"ring_caustic", {300, 200, 200000, 0.04}},
-      {"limelight", {256, 200, 100000, 0.02}}};
+      {"limelight", {256, 200, 100000, 0.02}},
+      {"sun_pane", {600, 200, 100000, 0.05}}};
   return kWorks;
 }
 
@@ -48,6 +49,7 @@ struct Way {
   PhaseSpace phase_space = PhaseSpace::Directions;
   RedistributionOptions redistribution = {};
   bool aperture = false;
+  SplittingOptions splitting = {};
 };
 
 const std::map<std::string, Way>& ways() {
@@ -63,14 +65,39 @@ const std::map<std::string, Way>& ways() {
       {"short_chains",
        {.mode = Mode::Redistribution, .drift = Drift::None, .redistribution = {0.2, 7, 6}}},
       {"redistribution_both_ends",
-       {.mode = Mode::Redistribution, .phase_space = PhaseSpace::Bidirectional}}};
+       {.mode = Mode::Redistribution, .phase_space = PhaseSpace::Bidirectional}},
+      {"splitting", {.mode = Mode::Splitting, .splitting = {.all = true, .levels = std::nullopt}}},
+      {"two_levels",
+       {.mode = Mode::Splitting,
+        .drift = Drift::None,
+        .splitting = {.all = true, .levels = 2, .steps = 1, .last_steps = 4}}},
+      {"eight_levels",
+       {.mode = Mode::Splitting,
+        .drift = Drift::Full,
+        .splitting = {.all = true, .levels = 8, .steps = 16, .last_steps = 1}}},
+      {"high_threshold",
+       {.mode = Mode::Splitting,
+        .phase_space = PhaseSpace::Bidirectional,
+        .redistribution = {.threshold = 20},
+        .splitting = {.all = true, .levels = 4}}}};
   return kWays;
+}
+
+/// With a sun so wide that path tracing finds it.
+LoadedScene sun_pane_in_haze() {
+  LoadedScene loaded = load_small("sun_pane");
+  const auto& sky = std::get<EnvironmentMap>(loaded.scene.emitters()[*loaded.scene.environment()]);
+  SceneBuilder builder(loaded.scene);
+  builder.replace_environment(sky.blurred(0.08));
+  loaded.scene = builder.build();
+  return loaded;
 }
 
 /// The ring is made so rough that path tracing hits the light's reflection often: else its rare
 /// hits would make means that are not normal.
 LoadedScene load_scene_of(const std::string& name) {
   if (name == "limelight") return {test::limelight(), 5, {}};
+  if (name == "sun_pane") return sun_pane_in_haze();
   if (name == "ring_caustic") return load_small(name, {{"alpha", "0.2"}});
   return load_small(name);
 }
@@ -110,6 +137,8 @@ TEST_P(LangevinEqualsPath, TileMeans) {
   options.direct = way.direct;
   options.phase_space = way.phase_space;
   options.redistribution = way.redistribution;
+  options.splitting = way.splitting;
+  options.splitting.pilot = 1024;
   options.bootstrap = work.bootstrap;
   options.max_depth = loaded.max_depth.value();
   const auto tiles = tiles_over_runs([&](std::uint64_t seed) {
@@ -136,7 +165,9 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"door_ajar", "redistribution_both_ends"},
                     Case{"ring_caustic", "divergence"}, Case{"ring_caustic", "short_chains"},
                     Case{"limelight", "from_sensor"}, Case{"limelight", "chains_alone"},
-                    Case{"limelight", "redistribution_both_ends"}),
+                    Case{"limelight", "redistribution_both_ends"}, Case{"sun_pane", "splitting"},
+                    Case{"sun_pane", "two_levels"}, Case{"sun_pane", "eight_levels"},
+                    Case{"sun_pane", "high_threshold"}),
     name_of);
 
 /// All of them, but for an island of glass_caustic, the lamp's reflection, that one strategy alone

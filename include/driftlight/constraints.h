@@ -43,11 +43,11 @@ class ConstraintVisitor : public WalkVisitor<T> {
   }
   void connect(const ScatterEvent<T>& e) { scatter(e); }
 
-  /// Environment map: the direction, of width 1 / |grad log L| between a texel and 1 radian.
+  /// Environment map: the direction, by the map's own precision.
   void environment(const Emitter& emitter, const Vec3<T>& v) {
     const auto* map = std::get_if<EnvironmentMap>(&emitter);
     if (map == nullptr) return;
-    add(v, environment_precision(*map, stripped(v)));
+    add(v, map->precision(stripped(v)));
   }
 
   /// Spot: the direction against the covariance of its cone.
@@ -133,30 +133,6 @@ class ConstraintVisitor : public WalkVisitor<T> {
     const S share = specular / (specular + diffuse);
     if (value(share) > 0.0) add(e.wo - mirror, share * b.exponent);
     if (value(share) < 1.0) add_diffuse(e, 1.0 - share);
-  }
-
-  /// |grad log L|^2 from the map's exact slopes along two tangents.
-  static S environment_precision(const EnvironmentMap& map, const Vec3<S>& v) {
-    using J = ceres::Jet<S, 2>;
-    const TangentBasis basis = tangent_basis(value(v));
-    // Minus their parts along v, which are 0 but whose derivatives are not where S is a jet: the
-    // slope stays tangential as v turns.
-    const S t_along = dot(basis.t, v);
-    const S b_along = dot(basis.b, v);
-    Vec3<J> seeded;
-    for (int i = 0; i < 3; ++i) {
-      seeded[i] = J(v[i]);
-      seeded[i].v[0] = basis.t[i] - t_along * v[i];
-      seeded[i].v[1] = basis.b[i] - b_along * v[i];
-    }
-    const J radiance = luminance(map.eval(seeded));
-    const double texel = map.texel_angle();
-    const S l2 = radiance.a * radiance.a;
-    const S slope2 = radiance.v[0] * radiance.v[0] + radiance.v[1] * radiance.v[1];
-    // Clamped, and constant beyond the clamp: a width, not a force, so the kink does no harm.
-    if (!(value(slope2) > value(l2))) return constant<S>(1.0);
-    if (value(slope2) * texel * texel > value(l2)) return constant<S>(1.0 / (texel * texel));
-    return slope2 / l2;
   }
 
   Sink& sink_;

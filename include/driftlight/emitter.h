@@ -109,19 +109,19 @@ class EnvironmentMap {
   /// Radiance from the unit world direction d (pointing away from the scene).
   template <Scalar T>
   Rgb<T> eval(const Vec3<T>& d) const {
-    using std::acos;
-    using std::atan2;
-    const T dx = dot(axis_x_, d);
-    const T dy = dot(axis_y_, d);
-    const T dz = dot(axis_z_, d);
-    const T x = atan2(dx, -dz) * (0.5 * kInvPi * static_cast<double>(bitmap_.width));
-    // Rounding may carry |dy| past 1; there the map is constant in v.
-    const T theta =
-        std::abs(value(dy)) < 1.0 ? T(acos(dy)) : constant<T>(value(dy) > 0 ? 0.0 : kPi);
-    const T y = theta * (kInvPi * static_cast<double>(bitmap_.height));
-    Rgb<T> c = lookup(bitmap_, x, y, Wrap::Repeat, Wrap::Clamp);
+    const Vec2<T> at = pixel(d);
+    Rgb<T> c = lookup(bitmap_, at.x(), at.y(), Wrap::Repeat, Wrap::Clamp);
     for (int i = 0; i < 3; ++i) c[i] = c[i] * scale_;
     return c;
+  }
+
+  /// How closely the map binds a direction: 1 / s^2, s the standard deviation in radians, between a
+  /// texel and 1, of the least blur that halves or doubles the luminance at d. Within a sun it is
+  /// the sun's size, beside one a part of the distance.
+  template <Scalar T>
+  T precision(const Vec3<T>& d) const {
+    const Vec2<T> at = pixel(d);
+    return lookup(precision_, at.x(), at.y(), Wrap::Repeat, Wrap::Clamp)[0];
   }
 
   /// Derivatives of `eval` by the world coordinates of d: a row for each colour. Only their
@@ -139,7 +139,31 @@ class EnvironmentMap {
   /// Angular size of a texel at the horizon, radians.
   double texel_angle() const { return kPi / static_cast<double>(bitmap_.height); }
 
+  /// Solid angle of what is brightest: Omega of a sun of even radiance S before a dark sky, for
+  /// which int L^n = S^n Omega,
+  ///   Omega = (int L^2)^3 / (int L^3)^2.
+  double peak_solid_angle() const;
+  /// Convolved over the sphere with (1 - (1 - cos gamma) / (5 sigma^2))_+^3, which for small sigma
+  /// has the standard deviation sigma, radians, along each axis; in a bitmap just as fine as that
+  /// needs. It is positive wherever this map is.
+  EnvironmentMap blurred(double sigma) const;
+
  private:
+  /// Where the unit direction d falls on the bitmap.
+  template <Scalar T>
+  Vec2<T> pixel(const Vec3<T>& d) const {
+    using std::acos;
+    using std::atan2;
+    const T dx = dot(axis_x_, d);
+    const T dy = dot(axis_y_, d);
+    const T dz = dot(axis_z_, d);
+    // Rounding may carry |dy| past 1; there the map is constant in v.
+    const T theta =
+        std::abs(value(dy)) < 1.0 ? T(acos(dy)) : constant<T>(value(dy) > 0 ? 0.0 : kPi);
+    return {atan2(dx, -dz) * (0.5 * kInvPi * static_cast<double>(bitmap_.width)),
+            theta * (kInvPi * static_cast<double>(bitmap_.height))};
+  }
+
   /// Patches of bilinear interpolation, between texel centres: width x (height + 1) of them. Where
   /// one is and where d lies in it, both offsets in [0, 1).
   struct Place {
@@ -151,6 +175,7 @@ class EnvironmentMap {
   double patch_solid_angle(int row) const;
 
   Bitmap bitmap_;
+  Bitmap precision_;                ///< the same number in all three channels
   Vec3d axis_x_, axis_y_, axis_z_;  ///< map axes in world space
   double scale_ = 1;
   std::vector<double> edges_;  ///< cosines with the pole of the edges of the rows, from the top

@@ -375,7 +375,7 @@ class StageSweep : RecordedPath<Rules> {
       Columns dv = Columns::zero();
       dv.set(columns_.omega, ray_.omega_t);
       dv.set(columns_.omega + 1, ray_.omega_b);
-      add(std::sqrt(environment_precision(*map)) / 3.0, dv);
+      add(std::sqrt(map->precision(path_.last_v)) / 3.0, dv);
       return;
     }
     const Hit& hit_at = topology_.vertices[topology_.scatter_count].hit;
@@ -393,17 +393,6 @@ class StageSweep : RecordedPath<Rules> {
       return (p - sphere->center) / sphere->radius;
     if (const auto* disk = std::get_if<Disk>(&geometry)) return disk->u.cross(disk->v).normalized();
     return geometric_normal(std::get<TriangleMesh>(geometry), primitive);
-  }
-
-  /// |grad log L|^2 along the sphere, between 1 and a texel's.
-  double environment_precision(const EnvironmentMap& map) const {
-    const Vec3d& v = path_.last_v;
-    const Vec3d slope = map.gradient(v).transpose() * kLuminance.matrix();
-    const double light = luminance(path_.radiance);
-    const double tangential2 = (slope - v.dot(slope) * v).squaredNorm() / (light * light);
-    const double texel = map.texel_angle();
-    if (!(tangential2 > 1.0)) return 1.0;
-    return std::min(tangential2, 1.0 / (texel * texel));
   }
 
   LocalColumns columns_ = kSensorColumns;

@@ -67,6 +67,7 @@ enum class DirectLight {
 enum class Mode {
   Chain,           ///< Markov chains, with normalization by independent samples
   Redistribution,  ///< independent samples; chains spread those that are rare and heavy
+  Splitting,       ///< that, and particles from softer versions of the scene for what is too rare
 };
 
 /// Of Mode::Redistribution.
@@ -83,11 +84,26 @@ struct RedistributionOptions {
   int pilot = 65536;
 };
 
+/// Of Mode::Splitting, whose samples and chains are those of Mode::Redistribution.
+struct SplittingOptions {
+  /// Particles carry all of the remainder, not only that for which a pilot finds them worth it.
+  bool all = false;
+  /// Softer levels above the scene; none: as the scene needs.
+  std::optional<int> levels;
+  /// Steps of a particle at each level.
+  int steps = 4;
+  /// Steps at the last one, whose visits make the image.
+  int last_steps = 16;
+  /// Samples of each round of the pilot.
+  int pilot = 16384;
+};
+
 /// The Langevin sampler of [E63].
 struct LangevinOptions {
   Mode mode = Mode::Redistribution;
   KernelOptions kernel;
   RedistributionOptions redistribution;
+  SplittingOptions splitting;
   PhaseSpace phase_space = PhaseSpace::Bidirectional;
   /// None: the fraction n_eff / n = E[w]^2 / E[w^2] of the bootstrap's samples that independent
   /// samples of f would be worth, within [0.1, 0.9]. Where it is high large steps alone do; where

@@ -18,7 +18,8 @@ enum class Stream : std::uint64_t {
   Chain,
   Pixel,
   Test,
-  GradientCheck
+  GradientCheck,
+  SplittingPilot
 };
 
 class Rng {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "driftlight/gradient_table.h"
 #include "driftlight/image.h"
@@ -65,6 +66,16 @@ struct KernelStatistics {
   KernelStatistics& operator+=(const KernelStatistics& other);
 };
 
+/// Of Mode::Splitting, at one level of softness.
+struct LevelFigures {
+  std::uint64_t particles = 0;  ///< that came to it
+  std::uint64_t died = 0;       ///< that went no further
+  KernelStatistics steps;
+  Rejections rejections;
+
+  LevelFigures& operator+=(const LevelFigures& other);
+};
+
 struct LangevinStatistics {
   KernelStatistics large_step;
   KernelStatistics small_step;
@@ -84,6 +95,14 @@ struct LangevinStatistics {
   double remainder = 0;
   std::uint64_t starts = 0;
   double samples_per_pixel = 0;
+  /// Of Mode::Splitting: from level 0, the scene itself, to the softest; empty if nothing was left
+  /// to splitting.
+  std::vector<LevelFigures> levels;
+  double split = 0;                 ///< mean luminance that particles carry
+  double split_deposit = 0;         ///< weight of a particle, in units of the brightness about
+  std::size_t split_sequences = 0;  ///< lobe sequences that are left to them
+  /// (sum F)^2 / (sum F^2) over families, F what all particles of one sample bring.
+  double effective_families = 0;
   double bootstrap_seconds = 0;
   double render_seconds = 0;
   bool stopped = false;

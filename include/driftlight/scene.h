@@ -128,6 +128,10 @@ class Scene {
 /// Collects the parts of a scene. Indices are returned in order from 0.
 class SceneBuilder {
  public:
+  SceneBuilder() = default;
+  /// Begins with copies of all parts of a scene, which keep their indices.
+  explicit SceneBuilder(const Scene& scene);
+
   std::uint32_t add_bsdf(Bsdf bsdf);
   std::uint32_t add_material(const Material& material);
   /// With `radiance` the shape is an area emitter. Throws InputError on an empty mesh or one whose
@@ -140,6 +144,11 @@ class SceneBuilder {
   /// A ConstantEnvironment or EnvironmentMap. Throws InputError on a second one.
   void set_environment(Emitter environment);
   void set_camera(const PerspectiveCamera& camera);
+
+  /// In the place of the BSDF of this index.
+  void replace_bsdf(std::uint32_t index, Bsdf bsdf);
+  /// In the place of the one that was set.
+  void replace_environment(Emitter environment);
 
   /// Throws InputError if there is no emitter or no light. The builder is empty afterwards.
   Scene build();

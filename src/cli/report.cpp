@@ -121,6 +121,39 @@ void report_redistribution(const LangevinStatistics& s, const Image& image, Repo
                   s.b > 0.0 ? 100.0 * s.remainder / s.b : 0.0, s.starts)};
 }
 
+Json to_json(const LevelFigures& level) {
+  return {{"particles", level.particles},
+          {"died", level.died},
+          {"steps", level.steps.proposed},
+          {"acceptance", level.steps.acceptance()}};
+}
+
+/// Of particles, if any were.
+void report_splitting(const LangevinStatistics& s, Report& report) {
+  Json levels = Json::array();
+  for (const LevelFigures& level : s.levels) levels.push_back(to_json(level));
+  report.statistics["splitting"] = {{"mean", s.split},
+                                    {"deposit", s.split_deposit},
+                                    {"lobe_sequences", s.split_sequences},
+                                    {"effective_families", s.effective_families},
+                                    {"levels", levels}};
+  if (s.split_sequences == 0) {
+    report.summary.push_back("splitting: nothing to gain, left to redistribution");
+    return;
+  }
+  report.summary.push_back(fmt::format(
+      "splitting: {:.2f} % of the mean, from {:.4g} effective families of {} lobe sequences",
+      s.b > 0.0 ? 100.0 * s.split / s.b : 0.0, s.effective_families, s.split_sequences));
+  for (std::size_t k = s.levels.size(); k-- > 0;) {
+    const LevelFigures& level = s.levels[k];
+    report.details.push_back(fmt::format(
+        "level {}: {} particles, {:.1f} % died, {} steps, acceptance {:.3f}", k, level.particles,
+        100.0 * static_cast<double>(level.died) /
+            static_cast<double>(std::max<std::uint64_t>(1, level.particles)),
+        level.steps.proposed, level.steps.acceptance()));
+  }
+}
+
 void report_check(const GradientTable& check, Report& report) {
   report.statistics["gradient_check"] = cli::to_json(check);
   report.summary.push_back(summary_line(check));
@@ -156,6 +189,7 @@ Report make_report(const LangevinResult& result, const LangevinOptions& options,
   report.details = {describe("large steps", s.large_step), describe("small steps", s.small_step),
                     describe(s.rejections, s.small_step.proposed)};
   if (options.mode == Mode::Chain) report.details.push_back(path_lengths(s));
+  if (options.mode == Mode::Splitting) report_splitting(s, report);
   if (result.gradient_check) report_check(*result.gradient_check, report);
   return report;
 }

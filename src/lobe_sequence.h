@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <compare>
+#include <cstdint>
+
+#include "driftlight/path.h"
+
+namespace driftlight {
+
+/// What a small step never changes: at each vertex whether the lobe is delta and whether it passes
+/// the surface, and how the path ends.
+class LobeSequence {
+ public:
+  explicit LobeSequence(const PathTopology& path)
+      : bits_(static_cast<std::uint64_t>(path.end) * (kMaxPathLength + 1) + path.light_count) {
+    for (int k = 0; k < path.scatter_count; ++k) {
+      const PathVertex& x = path.vertices[static_cast<std::size_t>(k)];
+      const bool through = x.scattering == Scattering::Transmission;
+      // Three states would do; a leading 1 would tell lengths apart, and so does that none is 0.
+      bits_ = bits_ * 5 + 1 + (x.delta ? 2 : 0) + (through ? 1 : 0);
+    }
+  }
+
+  auto operator<=>(const LobeSequence&) const = default;
+
+ private:
+  std::uint64_t bits_;
+};
+
+}  // namespace driftlight

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "splitting.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace driftlight {
+namespace {
+
+/// Most copies of a particle; beyond them its weight grows.
+constexpr double kMostCopies = 64;
+
+/// So many copies, each with its weight times `factor`: ratio in the mean.
+struct Copies {
+  int count;
+  double factor;
+};
+
+Copies copies(double ratio, Rng& rng) {
+  const double u = rng.uniform();
+  if (ratio > kMostCopies) return {static_cast<int>(kMostCopies), ratio / kMostCopies};
+  return {ratio > 0.0 ? static_cast<int>(std::floor(ratio + u)) : 0, 1.0};
+}
+
+/// A path of the top level that particles start from.
+struct Start {
+  PathTopology topology;
+  PathCoordinates coordinates;
+  Copies particles;
+};
+
+/// Finds them among the paths of one sample.
+struct StartSink {
+  const Scene& scene;
+  const BrightnessMap& brightness;
+  const SplittingPlan& plan;
+  PhaseSpace phase_space;
+  Vec2d film;
+  Rng& rng;
+  std::vector<Start>& starts;
+
+  void add(const Rgbd& value, const FoundPath& path) { splat(film, value, path); }
+  void splat(const Vec2d& at, const Rgbd& value, const FoundPath& path) {
+    const double w = luminance(value) / brightness(at);
+    if (!std::isfinite(w)) return;
+    const Copies particles = copies(w / plan.deposit, rng);
+    if (particles.count == 0) return;
+    const auto state = state_of(scene, path, phase_space);
+    if (state && plan.takes(LobeSequence(state->topology)))
+      starts.push_back({state->topology, state->coordinates, particles});
+  }
+};
+
+}  // namespace
+
+bool SplittingPlan::takes(LobeSequence sequence) const {
+  return all || std::binary_search(sequences.begin(), sequences.end(), sequence);
+}
+
+/// The particle at one level above the last.
+struct Splitter::Level {
+  explicit Level(const Scene& of_scene, const KernelOptions& kernel)
+      : scene(of_scene), small_step(of_scene, kernel) {}
+
+  void enter(const PathTopology& topology, const PathCoordinates& coordinates,
+             const Contribution& at) {
+    current->topology = topology;
+    current->coordinates = coordinates;
+    current->contribution = at;
+    current->has_step = false;
+  }
+
+  const Scene& scene;
+  SmallStep small_step;
+  ChainState states[2];
+  ChainState* current = &states[0];
+  ChainState* proposed = &states[1];
+};
+
+struct Splitter::Particles {
+  Particles(const TemperedScenes& scenes, const LangevinOptions& with,
+            const Remainder& of_remainder, const BrightnessMap& with_brightness, StepLayers* layers)
+      : options(with),
+        remainder(of_remainder),
+        brightness(with_brightness),
+        scene(scenes[0]),
+        last(scene, options.kernel, remainder, layers),
+        figures(static_cast<std::size_t>(scenes.top()) + 1) {
+    for (int k = 1; k <= scenes.top(); ++k)
+      levels.push_back(std::make_unique<Level>(scenes[k], options.kernel));
+  }
+
+  Level& level(int k) { return *levels[static_cast<std::size_t>(k - 1)]; }
+  LevelFigures& figures_of(int k) { return figures[static_cast<std::size_t>(k)]; }
+
+  double log_target(const Contribution& c) const {
+    return c.log_target - std::log(brightness(c.film));
+  }
+
+  /// Steps that leave pi_k invariant.
+  void walk(int k, Rng& rng) {
+    Level& at = level(k);
+    LevelFigures& counts = figures_of(k);
+    for (int i = 0; i < options.splitting.steps; ++i) {
+      ++counts.steps.proposed;
+      ChainState& from = *at.current;
+      ChainState& to = *at.proposed;
+      if (!at.small_step.propose(from, to, rng, counts.rejections)) continue;
+      const auto densities = at.small_step.log_densities(from, to, counts.rejections);
+      if (!densities) continue;
+      const double acceptance =
+          std::exp(log_acceptance(log_target(from.contribution), log_target(to.contribution),
+                                  densities->forward, densities->reverse));
+      counts.steps.accepted += acceptance;
+      if (rng.uniform() < acceptance)
+        std::swap(at.current, at.proposed);
+      else
+        ++counts.rejections.hastings;
+    }
+  }
+
+  /// From level k > 0, with a particle there, to the end.
+  void descend(int k, double deposit, Rng& rng) {
+    ++figures_of(k).particles;
+    walk(k, rng);
+    const ChainState& from = *level(k).current;
+    const double log_from = log_target(from.contribution);
+    const Scene& below = k > 1 ? level(k - 1).scene : scene;
+    const Contribution c = contribution(below, from.topology, from.coordinates);
+    Share share;
+    double log_to = -std::numeric_limits<double>::infinity();
+    if (std::isfinite(c.log_target)) {
+      if (k == 1) share = remainder.share(from.topology, from.coordinates, c);
+      log_to = k == 1 ? share.log_remainder : log_target(c);
+    }
+    const Copies next = copies(std::exp(log_to - log_from), rng);
+    if (next.count == 0) ++figures_of(k).died;
+    for (int i = 0; i < next.count; ++i) {
+      if (k == 1) {
+        finish(from, c, share, deposit * next.factor, rng);
+      } else {
+        level(k - 1).enter(from.topology, from.coordinates, c);
+        descend(k - 1, deposit * next.factor, rng);
+      }
+    }
+  }
+
+  /// At level 0.
+  void finish(const ChainState& from, const Contribution& c, const Share& share, double deposit,
+              Rng& rng) {
+    ++figures_of(0).particles;
+    const LobeSequence sequence(from.topology);
+    const int steps = options.splitting.last_steps;
+    last.start_at(from.topology, from.coordinates, c, share);
+    last.run(static_cast<std::uint64_t>(steps), rng,
+             [&](const Share& at, const Rgbd& color, double weight) {
+               (*visit)(sequence, at, color, weight * deposit / steps);
+             });
+  }
+
+  const LangevinOptions& options;
+  const Remainder& remainder;
+  const BrightnessMap& brightness;
+  const Scene& scene;
+  std::vector<std::unique_ptr<Level>> levels;  ///< 1 and above
+  RemainderChain last;
+  std::vector<LevelFigures> figures;
+  std::vector<Start> starts;
+  const Visit* visit = nullptr;
+};
+
+Splitter::Splitter(const TemperedScenes& scenes, const EmissionGuide& top_guide,
+                   const LangevinOptions& options, const Remainder& remainder,
+                   const BrightnessMap& brightness, StepLayers* layers)
+    : scenes_(scenes),
+      options_(options),
+      remainder_(remainder),
+      brightness_(brightness),
+      layers_(layers),
+      tracer_(scenes[scenes.top()], top_guide, MisHeuristic::Balance, options.max_depth) {}
+
+Splitter::Splitter(const Splitter& other)
+    : scenes_(other.scenes_),
+      options_(other.options_),
+      remainder_(other.remainder_),
+      brightness_(other.brightness_),
+      layers_(other.layers_),
+      tracer_(other.tracer_) {}
+
+Splitter::~Splitter() = default;
+
+void Splitter::sample(const Vec2d& film, const SplittingPlan& plan, Rng& rng, const Visit& visit) {
+  const int top = scenes_.top();
+  if (!particles_)
+    particles_ = std::make_unique<Particles>(scenes_, options_, remainder_, brightness_, layers_);
+  Particles& particles = *particles_;
+  particles.visit = &visit;
+  particles.starts.clear();
+  StartSink sink{scenes_[top], brightness_,     plan, options_.phase_space, film,
+                 rng,          particles.starts};
+  tracer_.sample(film, rng, sink);
+  for (const Start& start : particles.starts) {
+    const Contribution c = contribution(scenes_[top], start.topology, start.coordinates);
+    if (!std::isfinite(c.log_target)) continue;
+    for (int i = 0; i < start.particles.count; ++i) {
+      particles.level(top).enter(start.topology, start.coordinates, c);
+      particles.descend(top, plan.deposit * start.particles.factor, rng);
+    }
+  }
+}
+
+std::vector<LevelFigures> Splitter::take_figures() {
+  if (!particles_) return {};
+  const ChainFigures last = particles_->last.take_statistics();
+  particles_->figures_of(0).steps += last.small_step;
+  particles_->figures_of(0).rejections += last.rejections;
+  std::vector<LevelFigures> figures(particles_->figures.size());
+  std::swap(figures, particles_->figures);
+  return figures;
+}
+
+}  // namespace driftlight

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "splitting.h"
+
+namespace driftlight {
+
+/// Decides what splitting is worth its time for, from a pilot run of it: a function of its
+/// arguments, whatever the threads. Both ways to the same remainder are unbiased, so any choice is
+/// right.
+///
+/// Of the paths of one lobe sequence let F be what all particles of one sample of the top level
+/// bring to level 0, a family, and r = (w - tau)_+ what one sample of the scene itself leaves as
+/// remainder. Their means are the same, and per sample the noise of the one is E[F^2], of the other
+///   E[r^2] = int q (w - tau)_+^2 = int pi_0 (w - tau)_+,
+/// which the particles of level 0 know too, and far better than samples that seldom find these
+/// paths. Splitting takes the sequences for which the first is so much the smaller as its sample
+/// takes longer, if the noise that it saves matters beside that of the samples' own share.
+SplittingPlan plan_splitting(const Splitter& prototype, const LangevinOptions& options,
+                             std::uint64_t seed);
+
+}  // namespace driftlight

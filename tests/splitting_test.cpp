@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Laws of tempered splitting and its levels. That its images are right is for the slow tests.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "driftlight/render.h"
+#include "lobe_sequence.h"
+#include "support/test_scenes.h"
+#include "support/tiles.h"
+#include "tempered_scenes.h"
+
+namespace driftlight::test {
+namespace {
+
+/// A sky of radiance 1 with a Gaussian sun of standard deviation sigma, about the +z axis of the
+/// map's equator.
+EnvironmentMap gaussian_sun(int height, double sigma, double peak) {
+  Bitmap bitmap{2 * height, height, {}};
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < bitmap.width; ++x) {
+      const double theta = kPi * (y + 0.5) / height;
+      const double phi = 2.0 * kPi * (x + 0.5) / bitmap.width;
+      const double cosine = -std::sin(theta) * std::cos(phi);
+      const double light = 1.0 + peak * std::exp((cosine - 1.0) / (sigma * sigma));
+      bitmap.texels.emplace_back(Eigen::Array3f::Constant(static_cast<float>(light)));
+    }
+  }
+  return {std::move(bitmap), Eigen::Matrix3d::Identity(), 1.0};
+}
+
+/// A Gaussian sun has int L^n = peak^n 2 pi sigma^2 / n, so (int L^2)^3 / (int L^3)^2 is
+/// 2 pi sigma^2 9 / 8.
+TEST(EnvironmentBlur, KnowsTheSizeOfTheSun) {
+  for (const double sigma : {0.05, 0.1})
+    EXPECT_NEAR(gaussian_sun(256, sigma, 1e6).peak_solid_angle(), 2.25 * kPi * sigma * sigma,
+                0.02 * sigma * sigma * kPi);
+}
+
+/// Of the sun, along each axis: E[1 - cos gamma], as E[gamma^2 / 2] = sigma^2.
+double variance(const EnvironmentMap& sun) {
+  const Bitmap& map = sun.bitmap();
+  double sum = 0.0;
+  double moment = 0.0;
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      const double theta = kPi * (y + 0.5) / map.height;
+      const double phi = 2.0 * kPi * (x + 0.5) / map.width;
+      const double light = std::sin(theta) * (static_cast<double>(map.at(x, y)[0]) - 1.0);
+      sum += light;
+      moment += light * (1.0 + std::sin(theta) * std::cos(phi));
+    }
+  }
+  return moment / sum;
+}
+
+TEST(EnvironmentBlur, AddsVariancesAndKeepsEnergy) {
+  const EnvironmentMap sun = gaussian_sun(256, 0.05, 1e6);
+  const EnvironmentMap blurred = sun.blurred(0.12);
+  EXPECT_LT(blurred.bitmap().height, 60);
+  EXPECT_NEAR(blurred.total_luminance() / sun.total_luminance(), 1.0, 0.02);
+  EXPECT_NEAR(variance(blurred), 0.05 * 0.05 + 0.12 * 0.12, 0.0005);
+}
+
+TEST(EnvironmentMap, PrecisionIsThatOfTheSun) {
+  const double sigma = 0.05;
+  const EnvironmentMap sun = gaussian_sun(256, sigma, 1e6);
+  const auto width = [&](double angle) {
+    return 1.0 / std::sqrt(sun.precision(Vec3d(std::sin(angle), 0.0, std::cos(angle))));
+  };
+  EXPECT_NEAR(width(0.0), sigma, 0.3 * sigma);
+  EXPECT_NEAR(width(sigma), sigma, 0.6 * sigma);
+  // Away from it, less than the distance; and the far sky does not bind.
+  EXPECT_LT(width(0.5), 0.5);
+  EXPECT_GT(width(0.5), 0.05);
+  const EnvironmentMap even({64, 32, std::vector(64 * 32, Eigen::Array3f(1, 1, 1))},
+                            Eigen::Matrix3d::Identity(), 1.0);
+  EXPECT_EQ(even.precision(Vec3d(0.6, 0.0, 0.8)), 1.0);
+}
+
+/// sun_pane under a wide sun in a small map.
+Scene pane() {
+  SceneBuilder builder(load_small("sun_pane").scene);
+  builder.replace_environment(gaussian_sun(64, 0.03, 5e4));
+  return builder.build();
+}
+
+const EnvironmentMap& sky_of(const Scene& scene) {
+  return std::get<EnvironmentMap>(scene.emitters()[*scene.environment()]);
+}
+
+/// Each level is positive where the next sharper one is, and nowhere far darker.
+TEST(TemperedScenes, SoftenInSteps) {
+  const Scene scene = pane();
+  const TemperedScenes levels(scene, std::nullopt);
+  EXPECT_EQ(&levels[0], &scene);
+  EXPECT_EQ(levels.top(), 4);
+  for (int k = 1; k <= levels.top(); ++k) {
+    const EnvironmentMap& sharper = sky_of(levels[k - 1]);
+    const EnvironmentMap& softer = sky_of(levels[k]);
+    double most = 0.0;
+    for (std::uint64_t i = 0; i < 20000; ++i) {
+      Rng rng(1, Stream::Test, i);
+      const Vec3d d = sharper.sample(rng.uniform(), rng.uniform());
+      const double light = luminance(sharper.eval(d));
+      if (light > 0.0) most = std::max(most, light / luminance(softer.eval(d)));
+    }
+    EXPECT_LT(most, 9.0) << "level " << k;
+    EXPECT_GT(softer.peak_solid_angle(), 1.5 * sharper.peak_solid_angle()) << "level " << k;
+  }
+}
+
+TEST(TemperedScenes, AreAsManyAsAskedForAndNoneForAnEvenSky) {
+  const Scene scene = pane();
+  for (const int count : {0, 1, 3}) EXPECT_EQ(TemperedScenes(scene, count).top(), count);
+  EXPECT_EQ(TemperedScenes(load_small("cornell_glossy").scene, std::nullopt).top(), 0);
+}
+
+TEST(LobeSequence, TellsTopologiesApart) {
+  PathTopology path;
+  path.scatter_count = 2;
+  const LobeSequence plain(path);
+  PathTopology other = path;
+  other.emitter = 3;
+  EXPECT_EQ(plain, LobeSequence(other));
+  other.vertices[1].delta = true;
+  EXPECT_NE(plain, LobeSequence(other));
+  other = path;
+  other.vertices[0].scattering = Scattering::Transmission;
+  EXPECT_NE(plain, LobeSequence(other));
+  other = path;
+  other.scatter_count = 3;
+  EXPECT_NE(plain, LobeSequence(other));
+  other = path;
+  other.end = PathEnd::Environment;
+  EXPECT_NE(plain, LobeSequence(other));
+}
+
+LangevinResult render(const Scene& scene, const LangevinOptions& options, int threads) {
+  RenderOptions render;
+  render.threads = threads;
+  render.seed = 5;
+  return render_langevin(scene, options, render, 4);
+}
+
+LangevinOptions splitting() {
+  LangevinOptions options;
+  options.mode = Mode::Splitting;
+  options.max_depth = 6;
+  options.splitting.pilot = 512;
+  options.splitting.all = true;
+  return options;
+}
+
+TEST(Splitting, DoesNotDependOnThreads) {
+  const Scene scene = pane();
+  const LangevinResult one = render(scene, splitting(), 1);
+  ASSERT_EQ(one.statistics.levels.size(), 5U);
+  EXPECT_GT(one.statistics.levels[4].particles, 10U);
+  EXPECT_GT(one.statistics.split, 0.0);
+  EXPECT_GT(one.statistics.effective_families, 1.0);
+  for (const int threads : {2, 4}) {
+    const LangevinResult other = render(scene, splitting(), threads);
+    EXPECT_EQ(one.image.rgb, other.image.rgb);
+    EXPECT_EQ(one.statistics.mutations, other.statistics.mutations);
+    EXPECT_EQ(one.statistics.effective_families, other.statistics.effective_families);
+  }
+}
+
+/// Where a scene has nothing sharp, or no levels are wanted, it is redistribution, bit for bit.
+TEST(Splitting, WithoutLevelsIsRedistribution) {
+  LangevinOptions options = splitting();
+  options.splitting.levels = 0;
+  const Scene scene = pane();
+  LangevinOptions redistribution = splitting();
+  redistribution.mode = Mode::Redistribution;
+  EXPECT_EQ(render(scene, options, 2).image.rgb, render(scene, redistribution, 2).image.rgb);
+  const Scene room = load_small("cornell_glossy").scene;
+  const LangevinResult result = render(room, splitting(), 2);
+  EXPECT_EQ(result.image.rgb, render(room, redistribution, 2).image.rgb);
+  EXPECT_EQ(result.statistics.split_sequences, 0U);
+}
+
+}  // namespace
+}  // namespace driftlight::test
