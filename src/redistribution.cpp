@@ -59,7 +59,7 @@ struct Redistribution {
                options.mode == Mode::Splitting ? options.splitting.levels : std::optional(0)),
         top_guide(levels[levels.top()]) {
     if (render.check_gradients) probed.emplace(scene, options, render.seed);
-    if (levels.top() > 0) plan = plan_splitting(splitter(), options, render.seed);
+    if (levels.top() > 0) plan = plan_splitting(splitter(), scene.camera(), options, render.seed);
   }
 
   Splitter splitter() const {
@@ -97,6 +97,7 @@ struct Redistribution {
     result.mutations = result.small_step.proposed;
     if (!plan.takes_any()) return result;
     result.split_deposit = plan.deposit;
+    result.split_rate = plan.rate;
     result.split_sequences = plan.sequences.size();
     const double sum = families_.value();
     if (sum > 0.0) result.effective_families = sum * sum / squared_families_.value();
@@ -201,10 +202,16 @@ class RedistributionSampler {
 
   /// The remainder that is left to splitting.
   void split(const Vec2d& film, Rng& rng) {
+    const double rate = common_.plan.rate;
+    const double samples = std::floor(rate + rng.uniform());
+    for (double i = 0; i < samples; ++i) split_sample(film, 1.0 / rate, rng);
+  }
+  void split_sample(const Vec2d& film, double weight, Rng& rng) {
     double family = 0.0;
     splitter_.sample(film, common_.plan, rng,
-                     [&](LobeSequence, const Share& share, const Rgbd& color, double amount) {
-                       family += amount;
+                     [&](LobeSequence, const Share& share, const Rgbd& color, double visit) {
+                       const double amount = weight * visit;
+                       family += visit;
                        common_.split_film.splat(share.film, color,
                                                 amount * share.brightness / common_.unit);
                      });

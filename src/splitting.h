@@ -29,8 +29,9 @@ namespace driftlight {
 /// Which paths are left to splitting, and in which portions.
 struct SplittingPlan {
   bool all = false;
-  std::vector<LobeSequence> sequences;  ///< in order; if not all
-  double deposit = 1;                   ///< e
+  std::vector<LobeSequence> sequences = {};  ///< in order; if not all
+  double deposit = 1;                        ///< e
+  double rate = 1;                           ///< samples of the top level for each of the scene
 
   bool takes_any() const { return all || !sequences.empty(); }
   bool takes(LobeSequence sequence) const;

@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 namespace driftlight {
@@ -12,14 +13,20 @@ namespace {
 constexpr std::uint64_t kTask = 64;
 /// Weight of the pilot's particles.
 constexpr double kPilotDeposit = 4.0;
-/// Noise of the remainder, over that of splitting, from which on splitting takes it: the latter's
-/// sample takes about twice as long.
-constexpr double kWorth = 2.0;
+/// Noise of the remainder, over that of splitting, from which on splitting takes it. Redistribution
+/// spreads a heavy sample over hundreds of mutations, and so over some ten times the pixels that a
+/// family covers, and needs no second sample.
+constexpr double kWorth = 20.0;
 /// Least noise to be saved, in units of the squared brightness: that of the samples themselves is
 /// about 1.
 constexpr double kLeastSaving = 0.05;
 /// Least deposit of a visit, in units of the brightness of a pixel's sample.
 constexpr double kLeastDeposit = 0.2;
+/// What a step costs in samples of the scene.
+constexpr double kStepCost = 0.3;
+/// Fewest and most samples of the top level for each of the scene.
+constexpr double kFewest = 0.02;
+constexpr double kMost = 4.0;
 
 /// Sums over samples.
 struct Noise {
@@ -29,38 +36,57 @@ struct Noise {
 
 struct PilotRun {
   std::map<LobeSequence, Noise> noise;
-  double steps = 0;  ///< of all particles
+  double steps = 0;   ///< of all particles
+  double pixels = 0;  ///< sum of F_p^2 over the pixels p, F_p what a family brings to one
 };
 
-PilotRun run_task(Splitter splitter, const SplittingPlan& plan, double tau, std::uint64_t seed,
-                  std::uint64_t first) {
+/// A pilot's splitter with what it is to do.
+struct Pilot {
+  const Splitter& splitter;
+  const PerspectiveCamera& camera;
+  double tau;
+  std::uint64_t seed;
+
+  int pixel(const Vec2d& film) const {
+    return static_cast<int>(film.y() * camera.film_height) * camera.film_width +
+           static_cast<int>(film.x() * camera.film_width);
+  }
+};
+
+PilotRun run_task(const Pilot& pilot, const SplittingPlan& plan, std::uint64_t first) {
   PilotRun result;
+  Splitter splitter = pilot.splitter;
   std::map<LobeSequence, double> family;
+  std::map<int, double> pixels;
   for (std::uint64_t i = first; i < first + kTask; ++i) {
-    Rng rng(seed, Stream::SplittingPilot, i);
+    Rng rng(pilot.seed, Stream::SplittingPilot, i);
     const Vec2d film = rng.uniform2();
     family.clear();
+    pixels.clear();
     splitter.sample(film, plan, rng,
                     [&](LobeSequence sequence, const Share& share, const Rgbd&, double amount) {
                       family[sequence] += amount;
-                      result.noise[sequence].remainder += amount * (share.w - tau);
+                      pixels[pilot.pixel(share.film)] += amount;
+                      result.noise[sequence].remainder += amount * (share.w - pilot.tau);
                     });
     for (const auto& [sequence, sum] : family) result.noise[sequence].families += sum * sum;
+    for (const auto& [pixel, sum] : pixels) result.pixels += sum * sum;
   }
   for (const LevelFigures& level : splitter.take_figures())
     result.steps += static_cast<double>(level.steps.proposed);
   return result;
 }
 
-PilotRun run(const Splitter& prototype, const SplittingPlan& plan, double tau, std::uint64_t seed,
-             std::uint64_t first, std::uint64_t samples) {
+PilotRun run(const Pilot& pilot, const SplittingPlan& plan, std::uint64_t first,
+             std::uint64_t samples) {
   std::vector<PilotRun> runs(samples / kTask);
   tbb::parallel_for(std::size_t{0}, runs.size(), [&](std::size_t i) {
-    runs[i] = run_task(prototype, plan, tau, seed, first + i * kTask);
+    runs[i] = run_task(pilot, plan, first + i * kTask);
   });
   PilotRun sum;
   for (const PilotRun& part : runs) {
     sum.steps += part.steps;
+    sum.pixels += part.pixels;
     for (const auto& [sequence, noise] : part.noise) {
       sum.noise[sequence].families += noise.families;
       sum.noise[sequence].remainder += noise.remainder;
@@ -71,26 +97,29 @@ PilotRun run(const Splitter& prototype, const SplittingPlan& plan, double tau, s
 
 }  // namespace
 
-SplittingPlan plan_splitting(const Splitter& prototype, const LangevinOptions& options,
-                             std::uint64_t seed) {
-  const double tau = options.redistribution.threshold;
-  const std::uint64_t samples =
-      std::max<std::uint64_t>(1, static_cast<std::uint64_t>(options.splitting.pilot) / kTask) *
-      kTask;
-  const SplittingPlan everything{.all = true, .sequences = {}, .deposit = kPilotDeposit};
-  const PilotRun first = run(prototype, everything, tau, seed, 0, samples);
-  SplittingPlan plan{.all = options.splitting.all, .sequences = {}, .deposit = kPilotDeposit};
+SplittingPlan plan_splitting(const Splitter& prototype, const PerspectiveCamera& camera,
+                             const LangevinOptions& options, std::uint64_t seed) {
+  const Pilot pilot{prototype, camera, options.redistribution.threshold, seed};
+  const auto tasks = static_cast<std::uint64_t>(options.splitting.pilot) / kTask;
+  const std::uint64_t samples = std::max<std::uint64_t>(1, tasks) * kTask;
+  const auto count = static_cast<double>(samples);
+  const SplittingPlan everything{.all = true, .deposit = kPilotDeposit};
+  const PilotRun first = run(pilot, everything, 0, samples);
+  SplittingPlan plan{.all = options.splitting.all, .deposit = kPilotDeposit};
   double saved = 0.0;
   for (const auto& [sequence, noise] : first.noise) {
     if (!plan.all && noise.remainder < kWorth * noise.families) continue;
     plan.sequences.push_back(sequence);
     saved += noise.remainder - noise.families;
   }
-  if (!plan.all && saved < kLeastSaving * static_cast<double>(samples)) return {};
-  const PilotRun second = run(prototype, plan, tau, seed, samples, samples);
-  const double steps = second.steps / static_cast<double>(samples);
+  if (!plan.all && saved < kLeastSaving * count) return {};
+  const PilotRun second = run(pilot, plan, samples, samples);
+  // Work per particle does not depend on the deposit.
+  const double steps = kPilotDeposit * second.steps / count;
   plan.deposit = std::max(kLeastDeposit * options.splitting.last_steps,
-                          kPilotDeposit * steps / options.redistribution.mutations_per_sample);
+                          steps / options.redistribution.mutations_per_sample);
+  const double cost = 1.0 + kStepCost * steps / plan.deposit;
+  plan.rate = std::clamp(std::sqrt(second.pixels / count / cost), kFewest, kMost);
   return plan;
 }
 

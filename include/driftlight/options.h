@@ -100,7 +100,7 @@ struct SplittingOptions {
 
 /// The Langevin sampler of [E63].
 struct LangevinOptions {
-  Mode mode = Mode::Redistribution;
+  Mode mode = Mode::Splitting;
   KernelOptions kernel;
   RedistributionOptions redistribution;
   SplittingOptions splitting;

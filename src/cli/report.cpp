@@ -134,6 +134,7 @@ void report_splitting(const LangevinStatistics& s, Report& report) {
   for (const LevelFigures& level : s.levels) levels.push_back(to_json(level));
   report.statistics["splitting"] = {{"mean", s.split},
                                     {"deposit", s.split_deposit},
+                                    {"rate", s.split_rate},
                                     {"lobe_sequences", s.split_sequences},
                                     {"effective_families", s.effective_families},
                                     {"levels", levels}};
@@ -142,8 +143,10 @@ void report_splitting(const LangevinStatistics& s, Report& report) {
     return;
   }
   report.summary.push_back(fmt::format(
-      "splitting: {:.2f} % of the mean, from {:.4g} effective families of {} lobe sequences",
-      s.b > 0.0 ? 100.0 * s.split / s.b : 0.0, s.effective_families, s.split_sequences));
+      "splitting: {:.2f} % of the mean, from {:.4g} effective families of {} lobe sequences, "
+      "{:.3g} samples for each of the scene",
+      s.b > 0.0 ? 100.0 * s.split / s.b : 0.0, s.effective_families, s.split_sequences,
+      s.split_rate));
   for (std::size_t k = s.levels.size(); k-- > 0;) {
     const LevelFigures& level = s.levels[k];
     report.details.push_back(fmt::format(
