@@ -19,7 +19,7 @@ driftlight=$(dirname "$0")/../build/release/driftlight
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-names=(path bdpt chain redistribution)
+names=(path bdpt chain redistribution splitting)
 options_of() {
   case $1 in
     path | bdpt) echo "--integrator $1" ;;
@@ -44,7 +44,7 @@ median() { sort -g | sed -n "$(((runs + 1) / 2))p"; }
 mkdir -p "$references"
 printf '| scene |'
 printf ' %s |' "${names[@]}"
-printf '\n| --- | ---: | ---: | ---: | ---: |\n'
+printf '\n| --- | ---: | ---: | ---: | ---: | ---: |\n'
 for scene in "$@"; do
   name=$(basename "$scene" .xml)
   [[ $name == scene ]] && name=$(basename "$(dirname "$scene")")
