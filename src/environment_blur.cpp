@@ -131,8 +131,9 @@ EnvironmentMap EnvironmentMap::blurred(double sigma) const {
                        static_cast<std::size_t>(result.height));
   const Blur blur(bitmap_, result, sigma);
   tbb::parallel_for(0, result.height, [&](int y) {
+    const auto row = static_cast<std::size_t>(y) * static_cast<std::size_t>(result.width);
     for (int x = 0; x < result.width; ++x)
-      result.texels[static_cast<std::size_t>(y * result.width + x)] = blur(x, y);
+      result.texels[row + static_cast<std::size_t>(x)] = blur(x, y);
   });
   Eigen::Matrix3d to_world;
   to_world << axis_x_, axis_y_, axis_z_;

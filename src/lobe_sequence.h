@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <compare>
 #include <cstdint>
 
 #include "driftlight/path.h"
@@ -22,7 +21,8 @@ class LobeSequence {
     }
   }
 
-  auto operator<=>(const LobeSequence&) const = default;
+  bool operator==(const LobeSequence& other) const { return bits_ == other.bits_; }
+  bool operator<(const LobeSequence& other) const { return bits_ < other.bits_; }
 
  private:
   std::uint64_t bits_;

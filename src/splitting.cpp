@@ -23,35 +23,6 @@ Copies copies(double ratio, Rng& rng) {
   return {ratio > 0.0 ? static_cast<int>(std::floor(ratio + u)) : 0, 1.0};
 }
 
-/// A path of the top level that particles start from.
-struct Start {
-  PathTopology topology;
-  PathCoordinates coordinates;
-  Copies particles;
-};
-
-/// Finds them among the paths of one sample.
-struct StartSink {
-  const Scene& scene;
-  const BrightnessMap& brightness;
-  const SplittingPlan& plan;
-  PhaseSpace phase_space;
-  Vec2d film;
-  Rng& rng;
-  std::vector<Start>& starts;
-
-  void add(const Rgbd& value, const FoundPath& path) { splat(film, value, path); }
-  void splat(const Vec2d& at, const Rgbd& value, const FoundPath& path) {
-    const double w = luminance(value) / brightness(at);
-    if (!std::isfinite(w)) return;
-    const Copies particles = copies(w / plan.deposit, rng);
-    if (particles.count == 0) return;
-    const auto state = state_of(scene, path, phase_space);
-    if (state && plan.takes(LobeSequence(state->topology)))
-      starts.push_back({state->topology, state->coordinates, particles});
-  }
-};
-
 }  // namespace
 
 bool SplittingPlan::takes(LobeSequence sequence) const {
@@ -79,6 +50,15 @@ struct Splitter::Level {
 };
 
 struct Splitter::Particles {
+  /// A path of the top level that so many particles start from, of so many times the deposit.
+  struct Start {
+    PathTopology topology;
+    PathCoordinates coordinates;
+    int count;
+    double factor;
+  };
+  struct Sink;
+
   Particles(const TemperedScenes& scenes, const LangevinOptions& with,
             const Remainder& of_remainder, const BrightnessMap& with_brightness, StepLayers* layers)
       : options(with),
@@ -170,6 +150,28 @@ struct Splitter::Particles {
   const Visit* visit = nullptr;
 };
 
+/// Finds starts among the paths of one sample.
+struct Splitter::Particles::Sink {
+  const Scene& scene;
+  const BrightnessMap& brightness;
+  const SplittingPlan& plan;
+  PhaseSpace phase_space;
+  Vec2d film;
+  Rng& rng;
+  std::vector<Start>& starts;
+
+  void add(const Rgbd& value, const FoundPath& path) { splat(film, value, path); }
+  void splat(const Vec2d& at, const Rgbd& value, const FoundPath& path) {
+    const double w = luminance(value) / brightness(at);
+    if (!std::isfinite(w)) return;
+    const Copies particles = copies(w / plan.deposit, rng);
+    if (particles.count == 0) return;
+    const auto state = state_of(scene, path, phase_space);
+    if (state && plan.takes(LobeSequence(state->topology)))
+      starts.push_back({state->topology, state->coordinates, particles.count, particles.factor});
+  }
+};
+
 Splitter::Splitter(const TemperedScenes& scenes, const EmissionGuide& top_guide,
                    const LangevinOptions& options, const Remainder& remainder,
                    const BrightnessMap& brightness, StepLayers* layers)
@@ -197,15 +199,15 @@ void Splitter::sample(const Vec2d& film, const SplittingPlan& plan, Rng& rng, co
   Particles& particles = *particles_;
   particles.visit = &visit;
   particles.starts.clear();
-  StartSink sink{scenes_[top], brightness_,     plan, options_.phase_space, film,
-                 rng,          particles.starts};
+  Particles::Sink sink{scenes_[top], brightness_,     plan, options_.phase_space, film,
+                       rng,          particles.starts};
   tracer_.sample(film, rng, sink);
-  for (const Start& start : particles.starts) {
+  for (const Particles::Start& start : particles.starts) {
     const Contribution c = contribution(scenes_[top], start.topology, start.coordinates);
     if (!std::isfinite(c.log_target)) continue;
-    for (int i = 0; i < start.particles.count; ++i) {
+    for (int i = 0; i < start.count; ++i) {
       particles.level(top).enter(start.topology, start.coordinates, c);
-      particles.descend(top, plan.deposit * start.particles.factor, rng);
+      particles.descend(top, plan.deposit * start.factor, rng);
     }
   }
 }

@@ -80,9 +80,8 @@ PilotRun run_task(const Pilot& pilot, const SplittingPlan& plan, std::uint64_t f
 PilotRun run(const Pilot& pilot, const SplittingPlan& plan, std::uint64_t first,
              std::uint64_t samples) {
   std::vector<PilotRun> runs(samples / kTask);
-  tbb::parallel_for(std::size_t{0}, runs.size(), [&](std::size_t i) {
-    runs[i] = run_task(pilot, plan, first + i * kTask);
-  });
+  tbb::parallel_for(std::size_t{0}, runs.size(),
+                    [&](std::size_t i) { runs[i] = run_task(pilot, plan, first + i * kTask); });
   PilotRun sum;
   for (const PilotRun& part : runs) {
     sum.steps += part.steps;

@@ -14,8 +14,8 @@ namespace driftlight {
 /// remainder. Their means are the same, and per sample the noise of the one is E[F^2], of the other
 ///   E[r^2] = int q (w - tau)_+^2 = int pi_0 (w - tau)_+,
 /// which the particles of level 0 know too, and far better than samples that seldom find these
-/// paths. Splitting takes the sequences for which the first is far the smaller, if the noise that it
-/// saves matters beside that of the samples' own share.
+/// paths. Splitting takes the sequences for which the first is far the smaller, if the noise that
+/// it saves matters beside that of the samples' own share.
 ///
 /// Splitting's samples are as many for each sample of the scene as make the error least in a given
 /// time: with variances V, v and costs C, c of the samples of the scene and of the top level, their

@@ -74,6 +74,7 @@ const std::map<std::string, Way>& ways() {
       {"eight_levels",
        {.mode = Mode::Splitting,
         .drift = Drift::Full,
+        .redistribution = {.mutations_per_sample = 100},
         .splitting = {.all = true, .levels = 8, .steps = 16, .last_steps = 1}}},
       {"high_threshold",
        {.mode = Mode::Splitting,

@@ -110,6 +110,25 @@ TEST(TemperedScenes, SoftenInSteps) {
   }
 }
 
+/// A sun of one texel in a black sky: beyond it levels are black too, and within it none is.
+TEST(TemperedScenes, ArePositiveWhereverTheSceneIs) {
+  Bitmap bitmap{32, 16, std::vector(32 * 16, Eigen::Array3f(0, 0, 0))};
+  bitmap.texels[5 * 32 + 7] = {9.0F, 8.0F, 7.0F};
+  SceneBuilder builder(pane());
+  builder.replace_environment(EnvironmentMap(bitmap, Eigen::Matrix3d::Identity(), 1.0));
+  const Scene scene = builder.build();
+  const TemperedScenes levels(scene, 5);
+  for (int k = 1; k <= levels.top(); ++k) {
+    const EnvironmentMap& sharper = sky_of(levels[k - 1]);
+    for (std::uint64_t i = 0; i < 5000; ++i) {
+      Rng rng(1, Stream::Test, i);
+      const Vec3d d = sharper.sample(rng.uniform(), rng.uniform());
+      const bool light = luminance(sharper.eval(d)) > 0.0;
+      ASSERT_TRUE(!light || luminance(sky_of(levels[k]).eval(d)) > 0.0) << "level " << k;
+    }
+  }
+}
+
 TEST(TemperedScenes, AreAsManyAsAskedForAndNoneForAnEvenSky) {
   const Scene scene = pane();
   for (const int count : {0, 1, 3}) EXPECT_EQ(TemperedScenes(scene, count).top(), count);

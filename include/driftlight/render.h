@@ -100,7 +100,7 @@ struct LangevinStatistics {
   std::vector<LevelFigures> levels;
   double split = 0;                 ///< mean luminance that particles carry
   double split_deposit = 0;         ///< weight of a particle, in units of the brightness about
-  double split_rate = 0;  ///< samples of the softest level for each of the scene
+  double split_rate = 0;            ///< samples of the softest level for each of the scene
   std::size_t split_sequences = 0;  ///< lobe sequences that are left to them
   /// (sum F)^2 / (sum F^2) over families, F what all particles of one sample bring.
   double effective_families = 0;

@@ -119,10 +119,12 @@ void check_settings(const RenderCommand& command, const Options& options) {
     const bool chain = options.mode == Mode::Chain;
     if (chain && command.samples_per_pixel)
       throw UsageError(
-          "--spp is for the path, bdpt and light integrators and all modes but chain; mode=chain "
-          "takes --mutations-per-pixel");
+          "--spp is for the path, bdpt and light integrators and for mode=splitting and "
+          "mode=redistribution; mode=chain takes --mutations-per-pixel");
     if (!chain && command.mutations_per_pixel)
-      throw UsageError("--mutations-per-pixel is for mode=chain; the other modes take --spp");
+      throw UsageError(
+          "--mutations-per-pixel is for mode=chain; mode=splitting and mode=redistribution take "
+          "--spp");
     const KernelOptions& kernel = options.kernel;
     if (command.check_gradients && kernel.drift == Drift::None &&
         kernel.preconditioner == PreconditionerKind::Identity)

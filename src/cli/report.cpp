@@ -139,7 +139,7 @@ void report_splitting(const LangevinStatistics& s, Report& report) {
                                     {"effective_families", s.effective_families},
                                     {"levels", levels}};
   if (s.split_sequences == 0) {
-    report.summary.push_back("splitting: nothing to gain, left to redistribution");
+    report.summary.emplace_back("splitting: nothing to gain, left to redistribution");
     return;
   }
   report.summary.push_back(fmt::format(
