@@ -16,7 +16,7 @@ class LobeSequence {
     for (int k = 0; k < path.scatter_count; ++k) {
       const PathVertex& x = path.vertices[static_cast<std::size_t>(k)];
       const bool through = x.scattering == Scattering::Transmission;
-      // Three states would do; a leading 1 would tell lengths apart, and so does that none is 0.
+      // No digit is 0, so that sequences of different lengths differ.
       bits_ = bits_ * 5 + 1 + (x.delta ? 2 : 0) + (through ? 1 : 0);
     }
   }

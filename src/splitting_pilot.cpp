@@ -41,7 +41,7 @@ struct PilotRun {
 };
 
 /// A pilot's splitter with what it is to do.
-struct Pilot {
+struct Setup {
   const Splitter& splitter;
   const PerspectiveCamera& camera;
   double tau;
@@ -53,7 +53,7 @@ struct Pilot {
   }
 };
 
-PilotRun run_task(const Pilot& pilot, const SplittingPlan& plan, std::uint64_t first) {
+PilotRun run_task(const Setup& pilot, const SplittingPlan& plan, std::uint64_t first) {
   PilotRun result;
   Splitter splitter = pilot.splitter;
   std::map<LobeSequence, double> family;
@@ -77,7 +77,7 @@ PilotRun run_task(const Pilot& pilot, const SplittingPlan& plan, std::uint64_t f
   return result;
 }
 
-PilotRun run(const Pilot& pilot, const SplittingPlan& plan, std::uint64_t first,
+PilotRun run(const Setup& pilot, const SplittingPlan& plan, std::uint64_t first,
              std::uint64_t samples) {
   std::vector<PilotRun> runs(samples / kTask);
   tbb::parallel_for(std::size_t{0}, runs.size(),
@@ -98,7 +98,7 @@ PilotRun run(const Pilot& pilot, const SplittingPlan& plan, std::uint64_t first,
 
 SplittingPlan plan_splitting(const Splitter& prototype, const PerspectiveCamera& camera,
                              const LangevinOptions& options, std::uint64_t seed) {
-  const Pilot pilot{prototype, camera, options.redistribution.threshold, seed};
+  const Setup pilot{prototype, camera, options.redistribution.threshold, seed};
   const auto tasks = static_cast<std::uint64_t>(options.splitting.pilot) / kTask;
   const std::uint64_t samples = std::max<std::uint64_t>(1, tasks) * kTask;
   const auto count = static_cast<double>(samples);
