@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cmath>
+#include <vector>
 
 #include "strategy_weights.h"
 
@@ -35,23 +36,30 @@ class BidirectionalTracer {
         guide_(guide),
         tracer_(scene, guide, heuristic),
         weights_(guide, heuristic),
-        max_depth_(max_depth) {}
+        max_depth_(max_depth) {
+    for (std::uint32_t i = 0; i < scene.emitters().size(); ++i)
+      if (scene.is_blurred(i)) blurred_.push_back(i);
+  }
 
   template <class Sink>
   void sample(const Vec2d& film, Rng& rng, Sink& sink) {
     v_ = scene_.camera().direction(film);
     const auto escape = tracer_.trace(Walk::FromSensor, tracer_.leave_sensor(v_),
                                       RayFollower(scene_, v_), max_depth_, rng, from_sensor_);
-    trace_from_light(rng);
+    if (scene_.samples_emitters()) trace_from_light(rng);
     for (int t = 2; t < from_sensor_.size() + 2; ++t) {
       const SubpathVertex& z = from_sensor_[t - 2];
       hit_area(z, t, sink);
+      if (t > 2) see_blurred(z, t, sink);
       if (z.delta || t > max_depth_) continue;
-      connect_to_light(z, t, rng, sink);
+      if (scene_.samples_emitters()) connect_to_light(z, t, rng, sink);
       for (int s = 2; s < from_light_.size() + 2 && s + t <= max_depth_ + 1; ++s)
         if (!from_light_[s - 2].delta) connect(z, t, from_light_[s - 2], s, sink);
     }
-    if (escape) hit_environment(*escape, sink);
+    if (escape) {
+      hit_environment(*escape, sink);
+      see_blurred(*escape, sink);
+    }
     for (int s = 2; s < from_light_.size() + 2; ++s)
       if (!from_light_[s - 2].delta) connect_to_sensor(from_light_[s - 2], s, sink);
   }
@@ -74,6 +82,35 @@ class BidirectionalTracer {
     const Vec3d& v = z.surface.wi;
     const double w = weights_.hit(z, t, *end, end->p, v, end->n.dot(v));
     sink.add(w * z.throughput * end->emitted, path(0, t, *end, z.roulette));
+  }
+
+  /// Blurred lamps on the way to a vertex, none of which another strategy finds. What the sensor
+  /// itself sees of them is left to the scene (TemperedScenes::carry).
+  template <class Sink>
+  void see_blurred(const SubpathVertex& z, int t, Sink& sink) const {
+    const Vec3d& origin = from_sensor_[t - 3].surface.at.p;
+    const double distance = (z.surface.at.p - origin).norm();
+    see_blurred({origin, -z.surface.wi}, distance, z.throughput, t, z.roulette, sink);
+  }
+  template <class Sink>
+  void see_blurred(const Departure& escape, Sink& sink) const {
+    const int t = from_sensor_.size() + 2;
+    if (t > 2)
+      see_blurred({escape.p, escape.direction}, kInfinity, escape.throughput, t, escape.roulette,
+                  sink);
+  }
+  template <class Sink>
+  void see_blurred(const Ray<double>& ray, double distance, const Rgbd& throughput, int t,
+                   double roulette, Sink& sink) const {
+    for (const std::uint32_t i : blurred_) {
+      const auto& lamp = std::get<BlurredAreaEmitter>(scene_.emitters()[i]);
+      if (distance < lamp.clearance(ray.origin) || !lamp.shines(ray)) continue;
+      LightEnd end;
+      end.emitter = i;
+      end.p = ray.direction;
+      end.emitted = std::exp(lamp.log_share(ray)) * lamp.sharp().radiance;
+      sink.add(throughput * end.emitted, path(0, t, end, roulette));
+    }
   }
 
   template <class Sink>
@@ -139,6 +176,7 @@ class BidirectionalTracer {
   SubpathTracer tracer_;
   StrategyWeights weights_;
   int max_depth_;
+  std::vector<std::uint32_t> blurred_;  ///< emitters
   // Of the sample in hand.
   Vec3d v_{0, 0, 0};
   Emission emission_;  ///< that `from_light_` starts with

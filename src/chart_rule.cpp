@@ -37,7 +37,7 @@ class Edges {
 
 /// A finite emitter whose points have no coordinates, or an environment.
 bool has_no_light_side(const Scene& scene, const Emitter& emitter) {
-  const auto* area = std::get_if<AreaEmitter>(&emitter);
+  const AreaEmitter* area = area_of(emitter);
   return is_environment(emitter) || (area != nullptr && !has_points(scene.shapes()[area->shape]));
 }
 
@@ -51,7 +51,7 @@ Lobe lobe_of(const Bsdf& bsdf) {
 std::optional<int> light_side(PhaseSpace phase_space, const Scene& scene,
                               std::span<const Lobe> lobes, std::uint32_t index) {
   const Emitter& emitter = scene.emitters()[index];
-  const bool can_be_hit = is_environment(emitter) || std::holds_alternative<AreaEmitter>(emitter);
+  const bool can_be_hit = is_environment(emitter) || area_of(emitter) != nullptr;
   if (lobes.empty() && !can_be_hit) return std::nullopt;
   const bool has_directions = can_be_hit || lobes.back() != Lobe::Delta;
   const bool ends_wide = lobes.empty() || lobes.back() == Lobe::Wide;

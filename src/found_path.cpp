@@ -59,6 +59,8 @@ std::optional<PathSampler::Sample> state_of(const Scene& scene, const FoundPath&
                                             PhaseSpace phase_space) {
   CameraPart camera =
       camera_part(scene, found, phase_space, found.s == 0 ? found.t - 2 : found.t - 1);
+  if (found.s == 0 && scene.is_blurred(found.end.emitter))
+    return end_by_blurred_hit(scene, camera, found.end.emitter);
   if (found.s == 0) return end_by_hit(scene, camera);
   return join(scene, camera, light_part(found));
 }

@@ -77,6 +77,7 @@ LightEnd light_end_from(const Scene& scene, std::uint32_t index, const Vec2d& sq
 std::optional<LightEnd> light_end_at(const Scene& scene, const SurfaceHit& surface) {
   const auto& emitter = scene.shapes()[surface.hit.shape].emitter;
   if (!emitter || !surface.front) return std::nullopt;
+  if (!std::holds_alternative<AreaEmitter>(scene.emitters()[*emitter])) return std::nullopt;
   return area_end(scene, *emitter, {surface.at.p, surface.at.n_g});
 }
 

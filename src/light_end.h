@@ -18,7 +18,8 @@ struct LightEnd {
 
   Kind kind = Kind::Area;
   std::uint32_t emitter = 0;
-  Vec3d p{0, 0, 0};                   ///< position; at infinity the unit direction toward it
+  /// Position; at infinity, and of a blurred area emitter, the unit direction toward it.
+  Vec3d p{0, 0, 0};
   Vec3d n{0, 0, 0};                   ///< unit normal of an area emitter, on the side that emits
   const SpotEmitter* spot = nullptr;  ///< of a point that is one
   /// Radiance; intensity of a point, of a spot on its axis; irradiance of a directional emitter.

@@ -90,6 +90,7 @@ class Collector : public WalkVisitor<double> {
   void hit(const AreaEmitter& emitter, const double&, const double&) {
     end("hit " + kind_of(scene_.shapes()[emitter.shape]));
   }
+  void blurred_hit(const BlurredAreaEmitter&, const Ray<double>&) { end("blurred area"); }
   void environment(const Emitter& emitter, const Vec3d&) { end(kind_of(emitter)); }
   void area_connection(const AreaEmitter& emitter, const double&, const double&) {
     end("connection to " + kind_of(scene_.shapes()[emitter.shape]));
@@ -165,6 +166,7 @@ std::string kind_of(const Emitter& emitter) {
     std::string operator()(const EnvironmentMap&) const { return "environment map"; }
     std::string operator()(const SpotEmitter&) const { return "spot emitter"; }
     std::string operator()(const DirectionalEmitter&) const { return "directional emitter"; }
+    std::string operator()(const BlurredAreaEmitter&) const { return "blurred area emitter"; }
   };
   return std::visit(Kind{}, emitter);
 }

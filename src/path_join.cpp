@@ -209,6 +209,24 @@ std::optional<PathSampler::Sample> end_by_hit(const Scene& scene, CameraPart& pa
   return path;
 }
 
+/// The chart is that of the lamp itself, if it ends in a hit there.
+std::optional<PathSampler::Sample> end_by_blurred_hit(const Scene& scene, CameraPart& part,
+                                                      std::uint32_t emitter) {
+  PathTopology& topology = part.path.topology;
+  const auto& lamp = std::get<BlurredAreaEmitter>(scene.emitters()[emitter]);
+  const Shape& shape = scene.shapes()[lamp.sharp().shape];
+  if (part.last && connects_to_area(*part.last->bsdf, shape)) return std::nullopt;
+  if (topology.phase_space == PhaseSpace::Bidirectional) {
+    const PathPoints points = points_of(scene, part.path);
+    const auto count =
+        light_side(topology.phase_space, scene, {points.lobes.data(), points.count}, emitter);
+    if (count.value() > 0) return std::nullopt;
+  }
+  topology.end = PathEnd::Hit;
+  topology.emitter = emitter;
+  return part.path;
+}
+
 std::optional<PathSampler::Sample> join(const Scene& scene, CameraPart& part,
                                         const LightPart& light) {
   if (part.path.topology.phase_space == PhaseSpace::Bidirectional) {

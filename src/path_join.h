@@ -22,6 +22,9 @@ struct CameraPart {
 
 /// s = 0: the ray that leaves the camera part meets an emitter or the environment.
 std::optional<PathSampler::Sample> end_by_hit(const Scene& scene, CameraPart& part);
+/// s = 0: the ray that leaves the camera part sees the blurred lamp of this index.
+std::optional<PathSampler::Sample> end_by_blurred_hit(const Scene& scene, CameraPart& part,
+                                                      std::uint32_t emitter);
 /// s >= 1: an edge joins the two parts, whose facing ends are not delta vertices.
 std::optional<PathSampler::Sample> join(const Scene& scene, CameraPart& part,
                                         const LightPart& light);

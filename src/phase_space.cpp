@@ -121,6 +121,8 @@ class Tracer {
   }
 
   TraceStatus hit_emitter() {
+    const Emitter& emitter = scene_.emitters()[pattern_.emitter];
+    if (const auto* blurred = std::get_if<BlurredAreaEmitter>(&emitter)) return see(*blurred);
     const Hit hit = follower_.next_hit();
     if (!hit.valid()) return TraceStatus::Missed;
     const Shape& shape = scene_.shapes()[hit.shape];
@@ -129,6 +131,13 @@ class Tracer {
     result_.vertices[result_.scatter_count].hit = hit;
     result_.emitter = *shape.emitter;
     return TraceStatus::Ok;
+  }
+
+  TraceStatus see(const BlurredAreaEmitter& lamp) {
+    const Shape& shape = scene_.shapes()[lamp.sharp().shape];
+    if (bsdf_ != nullptr && connects_to_area(*bsdf_, shape)) return TraceStatus::OtherLobe;
+    if (!lamp.shines(follower_.ray())) return TraceStatus::Missed;
+    return is_clear(lamp, follower_) ? TraceStatus::Ok : TraceStatus::Occluded;
   }
 
   const Scene& scene_;

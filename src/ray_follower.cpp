@@ -23,6 +23,13 @@ TraceStatus connection_status(const Scene& scene, const SurfaceHit& from, const 
   return error < 1e-3 * edge.norm() ? TraceStatus::Ok : TraceStatus::Occluded;
 }
 
+bool is_clear(const BlurredAreaEmitter& lamp, RayFollower& follower) {
+  const Hit hit = follower.next_hit();
+  if (!hit.valid()) return true;
+  const Vec3d& origin = follower.ray().origin;
+  return (follower.surface(hit).at.p - origin).norm() >= lamp.clearance(origin);
+}
+
 TraceStatus infinity_status(const Scene& scene, const SurfaceHit& from, const Vec3d& wo) {
   const Vec3d start = scene.leave(from.at.p, from.at.n_g, wo);
   return scene.occluded_to_infinity(start, wo) ? TraceStatus::Occluded : TraceStatus::Ok;

@@ -74,6 +74,8 @@ class RayFollower {
 /// not y is seen in its direction on the same shape.
 TraceStatus connection_status(const Scene& scene, const SurfaceHit& from, const Emitter& emitter,
                               const EmitterPoint& y);
+/// Whether light of a blurred lamp on the follower's ray reaches the ray's origin.
+bool is_clear(const BlurredAreaEmitter& lamp, RayFollower& follower);
 /// Whether light passes from infinity, out of the unit direction wo; Ok or Occluded.
 TraceStatus infinity_status(const Scene& scene, const SurfaceHit& from, const Vec3d& wo);
 

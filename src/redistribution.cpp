@@ -59,11 +59,15 @@ struct Redistribution {
                options.mode == Mode::Splitting ? options.splitting.levels : std::optional(0)),
         top_guide(levels[levels.top()]) {
     if (render.check_gradients) probed.emplace(scene, options, render.seed);
-    if (levels.top() > 0) plan = plan_splitting(splitter(), scene.camera(), options, render.seed);
+    if (levels.top() > 0) plan = plan_splitting(levels, splitter(), options, render.seed);
   }
 
   Splitter splitter() const {
     return {levels, top_guide, options, remainder, pilot.brightness, layers};
+  }
+
+  bool leaves_to_splitting(const PathTopology& path) const {
+    return levels.carry(path) && plan.takes(LobeSequence(path));
   }
 
   /// From the mean remainder of a sample so far.
@@ -166,7 +170,7 @@ class RedistributionSampler {
     start.share = common_.remainder.share(start.topology, start.coordinates, start.contribution);
     if (!std::isfinite(start.share.log_remainder)) return 1.0;
     start.remainder = path.roulette * (start.share.w - tau);
-    if (!common_.plan.takes(LobeSequence(start.topology))) starts_.push_back(start);
+    if (!common_.leaves_to_splitting(start.topology)) starts_.push_back(start);
     return tau / start.share.w;
   }
 

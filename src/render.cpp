@@ -38,6 +38,8 @@ KernelStatistics& KernelStatistics::operator+=(const KernelStatistics& other) {
 LevelFigures& LevelFigures::operator+=(const LevelFigures& other) {
   particles += other.particles;
   died += other.died;
+  ratio += other.ratio;
+  squared_ratio += other.squared_ratio;
   steps += other.steps;
   rejections += other.rejections;
   return *this;

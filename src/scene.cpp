@@ -267,7 +267,7 @@ bool uses_texture(const Bsdf& bsdf) {
 
 // ---- Scene ----------------------------------------------------------------------------------
 
-Scene::Scene() = default;
+Scene::Scene() : surfaces_(std::make_shared<Surfaces>()) {}
 Scene::~Scene() = default;
 Scene::Scene(Scene&&) noexcept = default;
 Scene& Scene::operator=(Scene&&) noexcept = default;
@@ -310,7 +310,7 @@ Vec3d Scene::leave(const Vec3d& p, const Vec3d& n_g, const Vec3d& direction) con
 }
 
 EmitterPoint Scene::sample_area(const AreaEmitter& emitter, double u1, double u2) const {
-  const Shape& shape = shapes_[emitter.shape];
+  const Shape& shape = shapes()[emitter.shape];
   if (const auto* sphere = std::get_if<Sphere>(&shape.geometry)) {
     const Vec3d n = square_to_sphere(u1, u2);
     return {sphere->center + sphere->radius * n, sphere->flip_normals ? Vec3d(-n) : n};
@@ -325,72 +325,6 @@ EmitterPoint Scene::sample_area(const AreaEmitter& emitter, double u1, double u2
   const double root = std::sqrt(u1);
   const Vec3d point = p[0] + root * (1.0 - u2) * (p[1] - p[0]) + root * u2 * (p[2] - p[0]);
   return {point, geometric_normal(mesh, i)};
-}
-
-// ---- SceneBuilder ---------------------------------------------------------------------------
-
-SceneBuilder::SceneBuilder(const Scene& scene) {
-  scene_.camera_ = scene.camera_;
-  scene_.shapes_ = scene.shapes_;
-  scene_.materials_ = scene.materials_;
-  scene_.bsdfs_ = scene.bsdfs_;
-  scene_.emitters_ = scene.emitters_;
-  scene_.environment_ = scene.environment_;
-}
-
-std::uint32_t SceneBuilder::add_bsdf(Bsdf bsdf) {
-  scene_.bsdfs_.push_back(std::move(bsdf));
-  return static_cast<std::uint32_t>(scene_.bsdfs_.size() - 1);
-}
-
-std::uint32_t SceneBuilder::add_material(const Material& material) {
-  scene_.materials_.push_back(material);
-  return static_cast<std::uint32_t>(scene_.materials_.size() - 1);
-}
-
-std::uint32_t SceneBuilder::add_shape(Geometry geometry, std::uint32_t material,
-                                      std::optional<Rgbd> radiance) {
-  if (const auto* mesh = std::get_if<TriangleMesh>(&geometry)) {
-    if (mesh->triangles.empty()) throw InputError("a mesh without triangles");
-    for (const auto& triangle : mesh->triangles)
-      for (const std::uint32_t i : triangle)
-        if (i >= mesh->positions.size())
-          throw InputError("a triangle's vertex index " + std::to_string(i) +
-                           " is beyond the mesh's " + std::to_string(mesh->positions.size()) +
-                           " vertices");
-  }
-  const auto index = static_cast<std::uint32_t>(scene_.shapes_.size());
-  Shape shape;
-  shape.geometry = std::move(geometry);
-  shape.material = material;
-  if (radiance) {
-    shape.emitter = static_cast<std::uint32_t>(scene_.emitters_.size());
-    scene_.emitters_.emplace_back(AreaEmitter{*radiance, index});
-  }
-  scene_.shapes_.push_back(std::move(shape));
-  return index;
-}
-
-void SceneBuilder::add_emitter(PointEmitter emitter) { scene_.emitters_.emplace_back(emitter); }
-void SceneBuilder::add_emitter(SpotEmitter emitter) { scene_.emitters_.emplace_back(emitter); }
-void SceneBuilder::add_emitter(DirectionalEmitter emitter) {
-  scene_.emitters_.emplace_back(emitter);
-}
-
-void SceneBuilder::set_environment(Emitter environment) {
-  if (scene_.environment_) throw InputError("a scene can have one environment emitter only");
-  scene_.environment_ = static_cast<std::uint32_t>(scene_.emitters_.size());
-  scene_.emitters_.push_back(std::move(environment));
-}
-
-void SceneBuilder::set_camera(const PerspectiveCamera& camera) { scene_.camera_ = camera; }
-
-void SceneBuilder::replace_bsdf(std::uint32_t index, Bsdf bsdf) {
-  scene_.bsdfs_.at(index) = std::move(bsdf);
-}
-
-void SceneBuilder::replace_environment(Emitter environment) {
-  scene_.emitters_.at(scene_.environment_.value()) = std::move(environment);
 }
 
 namespace {
@@ -414,21 +348,90 @@ double power(const Emitter& emitter, std::span<const Shape> shapes, double scene
       return luminance(e.radiance) * 4.0 * kPi * disk;
     }
     double operator()(const EnvironmentMap& e) const { return e.total_luminance() * disk; }
+    double operator()(const BlurredAreaEmitter&) const { return 0.0; }
   };
   return std::visit(Visitor{shapes, kPi * scene_radius * scene_radius}, emitter);
 }
 
 }  // namespace
 
+void Scene::choose_emitters_by_power() {
+  std::vector<double> powers;
+  for (const Emitter& emitter : emitters_) powers.push_back(power(emitter, shapes(), radius_));
+  emitter_choice_ = DiscreteDistribution(powers);
+}
+
+Scene Scene::with_emitters(std::vector<Emitter> emitters) const {
+  Scene scene;
+  scene.camera_ = camera_;
+  scene.surfaces_ = surfaces_;
+  scene.emitters_ = std::move(emitters);
+  scene.environment_ = environment_;
+  scene.center_ = center_;
+  scene.radius_ = radius_;
+  scene.accelerator_ = accelerator_;
+  scene.choose_emitters_by_power();
+  return scene;
+}
+
+// ---- SceneBuilder ---------------------------------------------------------------------------
+
+std::uint32_t SceneBuilder::add_bsdf(Bsdf bsdf) {
+  scene_.surfaces_->bsdfs.push_back(std::move(bsdf));
+  return static_cast<std::uint32_t>(scene_.surfaces_->bsdfs.size() - 1);
+}
+
+std::uint32_t SceneBuilder::add_material(const Material& material) {
+  scene_.surfaces_->materials.push_back(material);
+  return static_cast<std::uint32_t>(scene_.surfaces_->materials.size() - 1);
+}
+
+std::uint32_t SceneBuilder::add_shape(Geometry geometry, std::uint32_t material,
+                                      std::optional<Rgbd> radiance) {
+  if (const auto* mesh = std::get_if<TriangleMesh>(&geometry)) {
+    if (mesh->triangles.empty()) throw InputError("a mesh without triangles");
+    for (const auto& triangle : mesh->triangles)
+      for (const std::uint32_t i : triangle)
+        if (i >= mesh->positions.size())
+          throw InputError("a triangle's vertex index " + std::to_string(i) +
+                           " is beyond the mesh's " + std::to_string(mesh->positions.size()) +
+                           " vertices");
+  }
+  const auto index = static_cast<std::uint32_t>(scene_.surfaces_->shapes.size());
+  Shape shape;
+  shape.geometry = std::move(geometry);
+  shape.material = material;
+  if (radiance) {
+    shape.emitter = static_cast<std::uint32_t>(scene_.emitters_.size());
+    scene_.emitters_.emplace_back(AreaEmitter{*radiance, index});
+  }
+  scene_.surfaces_->shapes.push_back(std::move(shape));
+  return index;
+}
+
+void SceneBuilder::add_emitter(PointEmitter emitter) { scene_.emitters_.emplace_back(emitter); }
+void SceneBuilder::add_emitter(SpotEmitter emitter) { scene_.emitters_.emplace_back(emitter); }
+void SceneBuilder::add_emitter(DirectionalEmitter emitter) {
+  scene_.emitters_.emplace_back(emitter);
+}
+
+void SceneBuilder::set_environment(Emitter environment) {
+  if (scene_.environment_) throw InputError("a scene can have one environment emitter only");
+  scene_.environment_ = static_cast<std::uint32_t>(scene_.emitters_.size());
+  scene_.emitters_.push_back(std::move(environment));
+}
+
+void SceneBuilder::set_camera(const PerspectiveCamera& camera) { scene_.camera_ = camera; }
+
 Scene SceneBuilder::build() {
   Scene& scene = scene_;
   if (scene.emitters_.empty()) throw InputError("the scene has no emitter");
   Eigen::AlignedBox3d box;
-  for (Shape& shape : scene.shapes_) {
+  for (Shape& shape : scene.surfaces_->shapes) {
     shape.extent = extent_of(shape.geometry);
-    const Material& material = scene.materials_.at(shape.material);
-    shape.textured = uses_texture(scene.bsdfs_.at(material.front)) ||
-                     (material.back && uses_texture(scene.bsdfs_.at(*material.back)));
+    const Material& material = scene.surfaces_->materials.at(shape.material);
+    shape.textured = uses_texture(scene.surfaces_->bsdfs.at(material.front)) ||
+                     (material.back && uses_texture(scene.surfaces_->bsdfs.at(*material.back)));
     if (shape.emitter)
       if (const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry))
         shape.triangles = triangles_by_area(*mesh);
@@ -440,25 +443,21 @@ Scene SceneBuilder::build() {
     scene.center_ = box.center();
     scene.radius_ = 0.5 * box.diagonal().norm();
   }
-  std::vector<double> powers;
-  for (const Emitter& emitter : scene.emitters_)
-    powers.push_back(power(emitter, scene.shapes_, scene.radius_));
-  scene.emitter_choice_ = DiscreteDistribution(powers);
-  if (!(scene.emitter_choice_.total() > 0.0))
-    throw InputError("all emitters of the scene are black");
+  scene.choose_emitters_by_power();
+  if (!scene.samples_emitters()) throw InputError("all emitters of the scene are black");
 
-  // User geometries point into shapes_, which does not move from here on.
-  scene.accelerator_ = std::make_unique<Scene::Accelerator>();
-  for (const Shape& shape : scene.shapes_) {
-    RTCGeometry geometry =
-        std::visit([&](const auto& s) { return embree_geometry(scene.accelerator_->device, s); },
-                   shape.geometry);
+  // User geometries point into the shapes, which do not move from here on.
+  const auto accelerator = std::make_shared<Scene::Accelerator>();
+  scene.accelerator_ = accelerator;
+  for (const Shape& shape : scene.surfaces_->shapes) {
+    RTCGeometry geometry = std::visit(
+        [&](const auto& s) { return embree_geometry(accelerator->device, s); }, shape.geometry);
     rtcCommitGeometry(geometry);
-    rtcAttachGeometry(scene.accelerator_->scene, geometry);
+    rtcAttachGeometry(accelerator->scene, geometry);
     rtcReleaseGeometry(geometry);
   }
-  rtcCommitScene(scene.accelerator_->scene);
-  if (rtcGetDeviceError(scene.accelerator_->device) != RTC_ERROR_NONE)
+  rtcCommitScene(accelerator->scene);
+  if (rtcGetDeviceError(accelerator->device) != RTC_ERROR_NONE)
     throw RuntimeError("Embree could not build the scene");
   return std::move(scene_);
 }

@@ -59,9 +59,10 @@ struct Splitter::Particles {
   };
   struct Sink;
 
-  Particles(const TemperedScenes& scenes, const LangevinOptions& with,
+  Particles(const TemperedScenes& with_scenes, const LangevinOptions& with,
             const Remainder& of_remainder, const BrightnessMap& with_brightness, StepLayers* layers)
-      : options(with),
+      : scenes(with_scenes),
+        options(with),
         remainder(of_remainder),
         brightness(with_brightness),
         scene(scenes[0]),
@@ -106,39 +107,54 @@ struct Splitter::Particles {
     walk(k, rng);
     const ChainState& from = *level(k).current;
     const double log_from = log_target(from.contribution);
-    const Scene& below = k > 1 ? level(k - 1).scene : scene;
-    const Contribution c = contribution(below, from.topology, from.coordinates);
-    Share share;
-    double log_to = -std::numeric_limits<double>::infinity();
-    if (std::isfinite(c.log_target)) {
-      if (k == 1) share = remainder.share(from.topology, from.coordinates, c);
-      log_to = k == 1 ? share.log_remainder : log_target(c);
-    }
-    const Copies next = copies(std::exp(log_to - log_from), rng);
-    if (next.count == 0) ++figures_of(k).died;
+    if (k == 1) return arrive(from, log_from, deposit, rng);
+    const Contribution c = contribution(level(k - 1).scene, from.topology, from.coordinates);
+    const Copies next = next_copies(k, log_target(c) - log_from, rng);
     for (int i = 0; i < next.count; ++i) {
-      if (k == 1) {
-        finish(from, c, share, deposit * next.factor, rng);
-      } else {
-        level(k - 1).enter(from.topology, from.coordinates, c);
-        descend(k - 1, deposit * next.factor, rng);
-      }
+      level(k - 1).enter(from.topology, from.coordinates, c);
+      descend(k - 1, deposit * next.factor, rng);
     }
   }
 
+  /// From level k on, to a target that is so many times as large.
+  Copies next_copies(int k, double log_ratio, Rng& rng) {
+    const double ratio = std::isnan(log_ratio) ? 0.0 : std::exp(log_ratio);
+    const Copies next = copies(ratio, rng);
+    LevelFigures& counts = figures_of(k);
+    counts.ratio += ratio;
+    counts.squared_ratio += ratio * ratio;
+    if (next.count == 0) ++counts.died;
+    return next;
+  }
+
   /// At level 0.
-  void finish(const ChainState& from, const Contribution& c, const Share& share, double deposit,
-              Rng& rng) {
+  void arrive(const ChainState& from, double log_from, double deposit, Rng& rng) {
+    const auto topology = scenes.at_level_0(from.topology, from.coordinates);
+    Contribution c;
+    Share share;
+    share.log_remainder = -kInfinity;
+    if (topology) {
+      c = contribution(scene, *topology, from.coordinates);
+      if (std::isfinite(c.log_target)) share = remainder.share(*topology, from.coordinates, c);
+    }
+    const Copies next = next_copies(1, share.log_remainder - log_from, rng);
+    for (int i = 0; i < next.count; ++i)
+      finish(*topology, from.coordinates, c, share, deposit * next.factor, rng);
+  }
+
+  void finish(const PathTopology& topology, const PathCoordinates& coordinates,
+              const Contribution& c, const Share& share, double deposit, Rng& rng) {
     ++figures_of(0).particles;
-    const LobeSequence sequence(from.topology);
+    const LobeSequence sequence(topology);
     const int steps = options.splitting.last_steps;
-    last.start_at(from.topology, from.coordinates, c, share);
+    last.start_at(topology, coordinates, c, share);
     last.run(static_cast<std::uint64_t>(steps), rng,
              [&](const Share& at, const Rgbd& color, double weight) {
                (*visit)(sequence, at, color, weight * deposit / steps);
              });
   }
 
+  const TemperedScenes& scenes;
   const LangevinOptions& options;
   const Remainder& remainder;
   const BrightnessMap& brightness;

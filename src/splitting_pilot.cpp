@@ -13,6 +13,9 @@ namespace {
 constexpr std::uint64_t kTask = 64;
 /// Weight of the pilot's particles.
 constexpr double kPilotDeposit = 4.0;
+/// Most that two successive levels may differ: E[r^2] = 16 / 7, that of a blur to a fourth of the
+/// area by (1 - q)^3, and a little more.
+constexpr double kMostSpread = 0.9;
 /// Noise of the remainder, over that of splitting, from which on splitting takes it. Redistribution
 /// spreads a heavy sample over hundreds of mutations, and so over some ten times the pixels that a
 /// family covers, and needs no second sample.
@@ -38,6 +41,19 @@ struct PilotRun {
   std::map<LobeSequence, Noise> noise;
   double steps = 0;   ///< of all particles
   double pixels = 0;  ///< sum of F_p^2 over the pixels p, F_p what a family brings to one
+  std::vector<LevelFigures> levels;
+
+  PilotRun& operator+=(const PilotRun& other) {
+    for (const auto& [sequence, part] : other.noise) {
+      noise[sequence].families += part.families;
+      noise[sequence].remainder += part.remainder;
+    }
+    steps += other.steps;
+    pixels += other.pixels;
+    levels.resize(std::max(levels.size(), other.levels.size()));
+    for (std::size_t k = 0; k < other.levels.size(); ++k) levels[k] += other.levels[k];
+    return *this;
+  }
 };
 
 /// A pilot's splitter with what it is to do.
@@ -72,7 +88,8 @@ PilotRun run_task(const Setup& pilot, const SplittingPlan& plan, std::uint64_t f
     for (const auto& [sequence, sum] : family) result.noise[sequence].families += sum * sum;
     for (const auto& [pixel, sum] : pixels) result.pixels += sum * sum;
   }
-  for (const LevelFigures& level : splitter.take_figures())
+  result.levels = splitter.take_figures();
+  for (const LevelFigures& level : result.levels)
     result.steps += static_cast<double>(level.steps.proposed);
   return result;
 }
@@ -83,22 +100,36 @@ PilotRun run(const Setup& pilot, const SplittingPlan& plan, std::uint64_t first,
   tbb::parallel_for(std::size_t{0}, runs.size(),
                     [&](std::size_t i) { runs[i] = run_task(pilot, plan, first + i * kTask); });
   PilotRun sum;
-  for (const PilotRun& part : runs) {
-    sum.steps += part.steps;
-    sum.pixels += part.pixels;
-    for (const auto& [sequence, noise] : part.noise) {
-      sum.noise[sequence].families += noise.families;
-      sum.noise[sequence].remainder += noise.remainder;
-    }
-  }
+  for (const PilotRun& part : runs) sum += part;
   return sum;
+}
+
+/// d of level k and the next one.
+double spread(const LevelFigures& level) {
+  if (!(level.ratio > 0.0)) return kInfinity;
+  const auto count = static_cast<double>(level.particles);
+  return std::log(count * level.squared_ratio / (level.ratio * level.ratio));
+}
+
+void leave_out_levels(const std::vector<LevelFigures>& figures, TemperedScenes& scenes) {
+  const int top = scenes.top();
+  if (figures.size() != static_cast<std::size_t>(top) + 1) return;
+  const auto spread_of = [&](int k) { return spread(figures[static_cast<std::size_t>(k)]); };
+  double sum = spread_of(top);
+  for (int k = top - 1; k >= 1; --k) {
+    sum += spread_of(k);
+    if (sum <= kMostSpread)
+      scenes.leave_out(k);
+    else
+      sum = spread_of(k);
+  }
 }
 
 }  // namespace
 
-SplittingPlan plan_splitting(const Splitter& prototype, const PerspectiveCamera& camera,
+SplittingPlan plan_splitting(TemperedScenes& scenes, const Splitter& prototype,
                              const LangevinOptions& options, std::uint64_t seed) {
-  const Setup pilot{prototype, camera, options.redistribution.threshold, seed};
+  const Setup pilot{prototype, scenes[0].camera(), options.redistribution.threshold, seed};
   const auto tasks = static_cast<std::uint64_t>(options.splitting.pilot) / kTask;
   const std::uint64_t samples = std::max<std::uint64_t>(1, tasks) * kTask;
   const auto count = static_cast<double>(samples);
@@ -112,7 +143,11 @@ SplittingPlan plan_splitting(const Splitter& prototype, const PerspectiveCamera&
     saved += noise.remainder - noise.families;
   }
   if (!plan.all && saved < kLeastSaving * count) return {};
-  const PilotRun second = run(pilot, plan, samples, samples);
+  PilotRun second = run(pilot, plan, samples, samples);
+  if (!options.splitting.levels) {
+    leave_out_levels(second.levels, scenes);
+    second = run(pilot, plan, 2 * samples, samples);
+  }
   // Work per particle does not depend on the deposit.
   const double steps = kPilotDeposit * second.steps / count;
   plan.deposit = std::max(kLeastDeposit * options.splitting.last_steps,

@@ -17,11 +17,17 @@ namespace driftlight {
 /// paths. Splitting takes the sequences for which the first is far the smaller, if the noise that
 /// it saves matters beside that of the samples' own share.
 ///
+/// Levels that little depends on are left out: with d = log E[r^2] / E[r]^2 of the ratio r between
+/// two levels, about the sum of those in between, d is at most that of halving a blur.
+///
 /// Splitting's samples are as many for each sample of the scene as make the error least in a given
 /// time: with variances V, v and costs C, c of the samples of the scene and of the top level, their
 /// numbers are as sqrt(V / C) to sqrt(v / c). Here V is about C about 1, and v the sum of F_p^2
 /// over pixels p, F_p what a family brings to one.
-SplittingPlan plan_splitting(const Splitter& prototype, const PerspectiveCamera& camera,
+///
+/// The levels of the prototype are `scenes`, of which those that are not needed are left out,
+/// unless the options say how many there are; the prototype must not have run.
+SplittingPlan plan_splitting(TemperedScenes& scenes, const Splitter& prototype,
                              const LangevinOptions& options, std::uint64_t seed);
 
 }  // namespace driftlight

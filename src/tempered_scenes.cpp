@@ -4,16 +4,29 @@
 #include <algorithm>
 #include <cmath>
 
+#include "driftlight/phase_space.h"
+#include "driftlight/walk.h"
+
 namespace driftlight {
 namespace {
 
-/// Standard deviation of the softest environment, radians: from anywhere a fair share of all
-/// directions then finds the sun.
-constexpr double kSoftest = 0.5;
+/// Standard deviations of the softest level, radians: from anywhere a fair share of all directions
+/// then finds the sun; and lamps not by rays that turn their backs to them.
+constexpr double kSoftestSun = 0.5;
+constexpr double kSoftestLamp = 0.3;
+/// Lamps that are wider than this are found without help.
+constexpr double kSmallLamp = 0.05;
 
-const EnvironmentMap* map_of(const Scene& scene) {
-  if (!scene.environment()) return nullptr;
-  return std::get_if<EnvironmentMap>(&scene.emitters()[*scene.environment()]);
+/// sigma at level k > 0 of `top`: from `sharpest` to `softest`.
+double sigma_at(int k, int top, double sharpest, double softest) {
+  const double share = top > 1 ? static_cast<double>(top - k) / (top - 1) : 0.0;
+  return softest * std::pow(std::min(sharpest, softest) / softest, share);
+}
+
+/// Levels that halve sigma; 0 where there is no need.
+int levels_between(double sharpest, double softest) {
+  const double halvings = std::log2(softest / sharpest);
+  return halvings < 1.0 ? 0 : 1 + static_cast<int>(std::lround(halvings));
 }
 
 /// A sun of solid angle Omega, blurred to a peak of S Omega / (2 pi sigma^2) = S / 4.
@@ -21,27 +34,126 @@ double sharpest_blur(const EnvironmentMap& map) {
   return std::sqrt(2.0 * kInvPi * map.peak_solid_angle());
 }
 
+// ---- Lamps ----------------------------------------------------------------------------------
+
+struct Farthest {
+  double distance = 0;  ///< from the centroid
+  double spread = 0;    ///< |W (p - centroid)|^2
+};
+
+Farthest farthest(const Shape& shape) {
+  if (const auto* sphere = std::get_if<Sphere>(&shape.geometry)) return {sphere->radius, 3.0};
+  if (const auto* disk = std::get_if<Disk>(&shape.geometry))
+    return {std::sqrt(disk->u.squaredNorm() + disk->v.squaredNorm()), 4.0};
+  Farthest most;
+  for (const auto& p : std::get<TriangleMesh>(shape.geometry).positions) {
+    const Vec3d offset = p.cast<double>() - shape.extent.centroid;
+    most.distance = std::max(most.distance, offset.norm());
+    most.spread = std::max(most.spread, (shape.extent.whitening * offset).squaredNorm());
+  }
+  return most;
+}
+
+/// None for a lamp that is but a line.
+std::optional<LampExtent> lamp_extent(const Shape& shape) {
+  const Farthest most = farthest(shape);
+  LampExtent lamp{.center = shape.extent.centroid, .spread = most.spread, .reach = most.distance};
+  int flat = -1;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3d row = shape.extent.whitening.row(i);
+    if (row.isZero(0.0)) {
+      if (flat >= 0) return std::nullopt;
+      flat = i;
+    } else {
+      lamp.axes.row(i) = row.normalized();
+      lamp.variance[i] = 1.0 / row.squaredNorm();
+    }
+  }
+  if (flat >= 0) {
+    const Vec3d a = lamp.axes.row((flat + 1) % 3);
+    const Vec3d b = lamp.axes.row((flat + 2) % 3);
+    lamp.axes.row(flat) = a.cross(b);
+    lamp.normal = emitter_normal(shape, lamp.center);
+  }
+  return lamp;
+}
+
+/// Angle under which the lamp's thinner side shows: from the sensor, or from the far side of the
+/// scene if that is nearer.
+double angular_size(const LampExtent& lamp, const Scene& scene) {
+  double least = lamp.variance.maxCoeff();
+  for (const double variance : lamp.variance)
+    if (variance > 0.0) least = std::min(least, variance);
+  const double distance = std::min(scene.radius(), (scene.camera().origin - lamp.center).norm());
+  return std::sqrt(least) / distance;
+}
+
+/// What of the scene is blurred.
+struct Sharp {
+  const EnvironmentMap* sun = nullptr;
+  struct Lamp {
+    std::uint32_t emitter;
+    LampExtent extent;
+    double size;
+  };
+  std::vector<Lamp> lamps;
+};
+
+Sharp sharp_parts(const Scene& scene) {
+  Sharp sharp;
+  for (std::uint32_t i = 0; i < scene.emitters().size(); ++i) {
+    const Emitter& emitter = scene.emitters()[i];
+    if (const auto* map = std::get_if<EnvironmentMap>(&emitter)) sharp.sun = map;
+    const auto* area = std::get_if<AreaEmitter>(&emitter);
+    const auto lamp = area != nullptr ? lamp_extent(scene.shapes()[area->shape]) : std::nullopt;
+    if (lamp) sharp.lamps.push_back({i, *lamp, angular_size(*lamp, scene)});
+  }
+  return sharp;
+}
+
+/// As many as the sharpest part needs.
+int levels_for(const Sharp& sharp) {
+  int count = sharp.sun != nullptr ? levels_between(sharpest_blur(*sharp.sun), kSoftestSun) : 0;
+  for (const Sharp::Lamp& lamp : sharp.lamps)
+    if (lamp.size < kSmallLamp) count = std::max(count, levels_between(lamp.size, kSoftestLamp));
+  return count;
+}
+
 }  // namespace
 
 TemperedScenes::TemperedScenes(const Scene& scene, std::optional<int> levels) : scene_(&scene) {
-  const EnvironmentMap* map = map_of(scene);
-  if (map == nullptr) return;
-  const double sharpest = std::min(sharpest_blur(*map), kSoftest);
-  const double halvings = std::log2(kSoftest / sharpest);
-  const int count =
-      levels.value_or(halvings < 1.0 ? 0 : 1 + static_cast<int>(std::lround(halvings)));
-  const EnvironmentMap* below = map;
+  const Sharp sharp = sharp_parts(scene);
+  if (sharp.sun == nullptr && sharp.lamps.empty()) return;
+  const int top = levels.value_or(levels_for(sharp));
+  blurs_lamps_ = top > 0 && !sharp.lamps.empty();
   double before = 0.0;
-  for (int k = 1; k <= count; ++k) {
-    const double share = count > 1 ? static_cast<double>(count - k) / (count - 1) : 0.0;
-    const double sigma = kSoftest * std::pow(sharpest / kSoftest, share);
-    SceneBuilder builder(scene);
-    // Variances of successive blurs add up.
-    builder.replace_environment(below->blurred(std::sqrt(sigma * sigma - before * before)));
-    softer_.push_back(builder.build());
-    below = map_of(softer_.back());
-    before = sigma;
+  for (int k = 1; k <= top; ++k) {
+    const std::span<const Emitter> below = (*this)[k - 1].emitters();
+    std::vector<Emitter> emitters(below.begin(), below.end());
+    for (const Sharp::Lamp& lamp : sharp.lamps)
+      emitters[lamp.emitter] =
+          BlurredAreaEmitter(std::get<AreaEmitter>(scene.emitters()[lamp.emitter]), lamp.extent,
+                             sigma_at(k, top, lamp.size, kSoftestLamp));
+    if (sharp.sun != nullptr) {
+      const double sigma = sigma_at(k, top, sharpest_blur(*sharp.sun), kSoftestSun);
+      // Variances of successive blurs add up.
+      const double added = std::sqrt(sigma * sigma - before * before);
+      emitters[*scene.environment()] =
+          std::get<EnvironmentMap>(below[*scene.environment()]).blurred(added);
+      before = sigma;
+    }
+    softer_.push_back(std::make_unique<const Scene>(scene.with_emitters(std::move(emitters))));
   }
+}
+
+/// Another lamp's paths are its own: it is blurred too.
+std::optional<PathTopology> TemperedScenes::at_level_0(const PathTopology& path,
+                                                       const PathCoordinates& coordinates) const {
+  if (!blurs_lamps_ || path.end != PathEnd::Hit) return path;
+  PathTopology result;
+  const bool reached = trace(*scene_, path, coordinates, result) == TraceStatus::Ok;
+  if (!reached || result.emitter != path.emitter) return std::nullopt;
+  return result;
 }
 
 }  // namespace driftlight

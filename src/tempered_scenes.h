@@ -3,14 +3,20 @@
 ///
 /// Level 0 is the scene itself, and each level k > 0 is softer than the one before: an environment
 /// map is blurred with the standard deviation sigma_k, a geometric sequence from the size of its
-/// sun up to kSoftest. Geometry, materials and indices are the same at all levels, so a path of one
-/// level, with its topology and coordinates, is one of all; and its contribution is positive at
-/// level k wherever it is at level k - 1.
+/// sun up to wide, and small area emitters likewise (BlurredAreaEmitter). Surfaces, materials and
+/// indices are the same at all levels, so a path of one level, with its topology and coordinates,
+/// is one of all; and its contribution is positive at level k wherever it is at level k - 1.
+/// Two things are not alike. Where a blurred lamp ends a path there is no vertex: at level 0 its
+/// last hit is to be traced. And only rays see it that leave a surface: lamps that the sensor sees
+/// directly, and paths in whose chart a point on an area emitter is among the coordinates, are left
+/// to level 0.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
+#include "driftlight/path.h"
 #include "driftlight/scene.h"
 
 namespace driftlight {
@@ -24,12 +30,26 @@ class TemperedScenes {
   /// The softest level.
   int top() const { return static_cast<int>(softer_.size()); }
   const Scene& operator[](int level) const {
-    return level == 0 ? *scene_ : softer_[static_cast<std::size_t>(level - 1)];
+    return level == 0 ? *scene_ : *softer_[static_cast<std::size_t>(level - 1)];
+  }
+  /// Leaves out a level between the scene and the softest one. The others' scenes stay where they
+  /// are.
+  void leave_out(int level) { softer_.erase(softer_.begin() + (level - 1)); }
+  /// A path of a softer level, as it is at level 0; none if it does not reach its emitter there.
+  std::optional<PathTopology> at_level_0(const PathTopology& path,
+                                         const PathCoordinates& coordinates) const;
+  /// Whether a path of level 0 is one of all levels.
+  bool carry(const PathTopology& path) const {
+    if (!blurs_lamps_) return true;
+    const bool seen_directly = path.end == PathEnd::Hit && path.scatter_count == 0;
+    return !seen_directly && path.end != PathEnd::AreaConnection &&
+           path.end != PathEnd::AreaEmission;
   }
 
  private:
   const Scene* scene_;
-  std::vector<Scene> softer_;
+  std::vector<std::unique_ptr<const Scene>> softer_;
+  bool blurs_lamps_ = false;
 };
 
 }  // namespace driftlight

@@ -45,6 +45,10 @@ struct VisitorPair : WalkVisitor<T> {
     first.environment(emitter, v);
     second.environment(emitter, v);
   }
+  void blurred_hit(const BlurredAreaEmitter& emitter, const Ray<T>& ray) {
+    first.blurred_hit(emitter, ray);
+    second.blurred_hit(emitter, ray);
+  }
   void area_connection(const AreaEmitter& emitter, const T& cosine, const T& r2) {
     first.area_connection(emitter, cosine, r2);
     second.area_connection(emitter, cosine, r2);

@@ -36,7 +36,8 @@ const std::map<std::string, Work>& works() {
       {"door_ajar", {200, 150, 200000, 0.12}},
       {"ring_caustic", {300, 200, 200000, 0.04}},
       {"limelight", {256, 200, 100000, 0.02}},
-      {"sun_pane", {600, 200, 100000, 0.05}}};
+      {"sun_pane", {600, 200, 100000, 0.05}},
+      {"lamp_in_glass", {1500, 200, 200000, 0.12}}};
   return kWorks;
 }
 
@@ -88,9 +89,7 @@ const std::map<std::string, Way>& ways() {
 LoadedScene sun_pane_in_haze() {
   LoadedScene loaded = load_small("sun_pane");
   const auto& sky = std::get<EnvironmentMap>(loaded.scene.emitters()[*loaded.scene.environment()]);
-  SceneBuilder builder(loaded.scene);
-  builder.replace_environment(sky.blurred(0.08));
-  loaded.scene = builder.build();
+  loaded.scene = loaded.scene.with_emitters({sky.blurred(0.08)});
   return loaded;
 }
 
@@ -99,6 +98,7 @@ LoadedScene sun_pane_in_haze() {
 LoadedScene load_scene_of(const std::string& name) {
   if (name == "limelight") return {test::limelight(), 5, {}};
   if (name == "sun_pane") return sun_pane_in_haze();
+  if (name == "lamp_in_glass") return load_small(name, {{"filament", "0.1"}});
   if (name == "ring_caustic") return load_small(name, {{"alpha", "0.2"}});
   return load_small(name);
 }
@@ -139,7 +139,7 @@ TEST_P(LangevinEqualsPath, TileMeans) {
   options.phase_space = way.phase_space;
   options.redistribution = way.redistribution;
   options.splitting = way.splitting;
-  options.splitting.pilot = 1024;
+  options.splitting.pilot = 8192;
   options.bootstrap = work.bootstrap;
   options.max_depth = loaded.max_depth.value();
   const auto tiles = tiles_over_runs([&](std::uint64_t seed) {
@@ -167,20 +167,22 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"ring_caustic", "divergence"}, Case{"ring_caustic", "short_chains"},
                     Case{"limelight", "from_sensor"}, Case{"limelight", "chains_alone"},
                     Case{"limelight", "redistribution_both_ends"}, Case{"sun_pane", "splitting"},
-                    Case{"sun_pane", "two_levels"}, Case{"sun_pane", "eight_levels"},
-                    Case{"sun_pane", "high_threshold"}),
+                    Case{"sun_pane", "two_levels"}, Case{"sun_pane", "high_threshold"},
+                    Case{"glass_caustic", "splitting"}, Case{"lamp_in_glass", "two_levels"}),
     name_of);
 
 /// All of them, but for an island of glass_caustic, the lamp's reflection, that one strategy alone
 /// finds, and hardly ever: the brightness that chains without direct light apart give it is right
-/// on average, but so skewed that a t-test over 20 runs does not see it.
+/// on average, but so skewed that a t-test over 20 runs does not see it. With two levels one step
+/// of which is to lead from an area to its hundredth part there, a few of all particles carry much.
 std::vector<Case> all_cases() {
   std::vector<Case> cases;
   for (const auto& scene : works())
     for (const auto& way : ways()) {
       const bool rare = scene.first == "glass_caustic" && way.second.mode == Mode::Chain &&
                         way.second.direct == DirectLight::Chain;
-      if (!rare) cases.emplace_back(scene.first, way.first);
+      const bool steep = scene.first == "glass_caustic" && way.first == "two_levels";
+      if (!rare && !steep) cases.emplace_back(scene.first, way.first);
     }
   return cases;
 }

@@ -4,7 +4,11 @@
 
 #include <cmath>
 
+#include "driftlight/contribution.h"
+#include "driftlight/gradient_check.h"
+#include "driftlight/phase_space.h"
 #include "driftlight/render.h"
+#include "driftlight/scene_check.h"
 #include "lobe_sequence.h"
 #include "support/test_scenes.h"
 #include "support/tiles.h"
@@ -79,11 +83,7 @@ TEST(EnvironmentMap, PrecisionIsThatOfTheSun) {
 }
 
 /// sun_pane under a wide sun in a small map.
-Scene pane() {
-  SceneBuilder builder(load_small("sun_pane").scene);
-  builder.replace_environment(gaussian_sun(64, 0.03, 5e4));
-  return builder.build();
-}
+Scene pane() { return load_small("sun_pane").scene.with_emitters({gaussian_sun(64, 0.03, 5e4)}); }
 
 const EnvironmentMap& sky_of(const Scene& scene) {
   return std::get<EnvironmentMap>(scene.emitters()[*scene.environment()]);
@@ -114,9 +114,8 @@ TEST(TemperedScenes, SoftenInSteps) {
 TEST(TemperedScenes, ArePositiveWhereverTheSceneIs) {
   Bitmap bitmap{32, 16, std::vector(32 * 16, Eigen::Array3f(0, 0, 0))};
   bitmap.texels[5 * 32 + 7] = {9.0F, 8.0F, 7.0F};
-  SceneBuilder builder(pane());
-  builder.replace_environment(EnvironmentMap(bitmap, Eigen::Matrix3d::Identity(), 1.0));
-  const Scene scene = builder.build();
+  const Scene scene =
+      pane().with_emitters({EnvironmentMap(bitmap, Eigen::Matrix3d::Identity(), 1.0)});
   const TemperedScenes levels(scene, 5);
   for (int k = 1; k <= levels.top(); ++k) {
     const EnvironmentMap& sharper = sky_of(levels[k - 1]);
@@ -127,6 +126,88 @@ TEST(TemperedScenes, ArePositiveWhereverTheSceneIs) {
       ASSERT_TRUE(!light || luminance(sky_of(levels[k]).eval(d)) > 0.0) << "level " << k;
     }
   }
+}
+
+/// A lamp in glass that rays from the sensor hit often enough.
+LoadedScene wide_lamp() { return load_small("lamp_in_glass", {{"filament", "0.05"}}); }
+
+/// Paths that a ray to the lamp ends behind glass.
+std::vector<PathSampler::Sample> paths_to_lamp(const LoadedScene& loaded, std::size_t count) {
+  std::vector<PathSampler::Sample> paths;
+  for (std::uint64_t i = 0; paths.size() < count; ++i) {
+    const auto path =
+        draw_light_path(loaded.scene, loaded.max_depth.value(), 3, i, PhaseSpace::Directions);
+    if (path && path->topology.end == PathEnd::Hit && path->topology.length() > 1)
+      paths.push_back(*path);
+  }
+  return paths;
+}
+
+/// A path of the scene is one of all levels, where nothing stands in its way that does not in the
+/// scene, and nowhere far darker.
+TEST(TemperedScenes, LampsShineWhereverTheSceneIsLit) {
+  const LoadedScene loaded = wide_lamp();
+  const TemperedScenes levels(loaded.scene, 4);
+  for (const PathSampler::Sample& path : paths_to_lamp(loaded, 200)) {
+    const auto sharp = levels.at_level_0(path.topology, path.coordinates);
+    ASSERT_TRUE(sharp && levels.carry(*sharp));
+    double before = contribution(loaded.scene, *sharp, path.coordinates).log_target;
+    for (int k = 1; k <= levels.top(); ++k) {
+      PathTopology traced;
+      ASSERT_EQ(trace(levels[k], path.topology, path.coordinates, traced), TraceStatus::Ok);
+      const double here = contribution(levels[k], traced, path.coordinates).log_target;
+      EXPECT_LT(before - here, std::log(8.0)) << "level " << k;
+      before = here;
+    }
+  }
+}
+
+/// Jets, derivatives by hand and differences agree on paths to a blurred lamp.
+TEST(TemperedScenes, DerivativesFollowTheLevel) {
+  const LoadedScene loaded = wide_lamp();
+  const TemperedScenes levels(loaded.scene, 3);
+  int compared = 0;
+  for (const PathSampler::Sample& path : paths_to_lamp(loaded, 60))
+    for (int k = 1; k <= levels.top(); ++k) {
+      const PathCheck check = check_path(levels[k], path.topology, path.coordinates);
+      for (const Quantity quantity : kQuantities) {
+        EXPECT_TRUE(check[quantity].passes(quantity))
+            << name(quantity) << " at level " << k << ": " << check[quantity].error;
+        compared += check[quantity].compared;
+      }
+    }
+  EXPECT_GT(compared, 1000);
+}
+
+/// The power that a lamp sends toward a point is about that of the lamp itself at all levels.
+TEST(BlurredAreaEmitter, KeepsItsPower) {
+  LampExtent lamp;
+  lamp.variance = Vec3d(4e-4, 1e-4, 0.0);
+  lamp.normal = Vec3d::UnitZ();
+  lamp.spread = 4.0;
+  lamp.reach = 0.05;
+  const Vec3d origin(0.3, -0.2, 1.0);
+  const double distance = origin.norm();
+  const double cosine = origin.z() / distance;
+  // A disk of semi-axes 0.04 and 0.02.
+  const double truth = kPi * 0.04 * 0.02 * cosine / (distance * distance);
+  for (const double sigma : {0.005, 0.02, 0.08}) {
+    const BlurredAreaEmitter blurred(AreaEmitter{}, lamp, sigma);
+    double sum = 0.0;
+    const int n = 400;
+    const double half = 5.0 * (sigma + 0.04);
+    const TangentBasis basis = tangent_basis(Vec3d(-origin / distance));
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) {
+        const double x = half * (2.0 * (i + 0.5) / n - 1.0);
+        const double y = half * (2.0 * (j + 0.5) / n - 1.0);
+        const Vec3d v = -origin / distance + x * basis.t + y * basis.b;
+        const Ray<double> ray{origin, v.normalized()};
+        if (blurred.shines(ray)) sum += std::exp(blurred.log_share(ray)) * std::pow(v.norm(), -3.0);
+      }
+    EXPECT_NEAR(sum * std::pow(2.0 * half / n, 2) / truth, 1.0, 0.03) << sigma;
+  }
+  EXPECT_FALSE(BlurredAreaEmitter(AreaEmitter{}, lamp, 0.1).shines({-origin, origin / distance}));
 }
 
 TEST(TemperedScenes, AreAsManyAsAskedForAndNoneForAnEvenSky) {

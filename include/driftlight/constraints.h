@@ -50,6 +50,12 @@ class ConstraintVisitor : public WalkVisitor<T> {
     add(v, map->precision(stripped(v)));
   }
 
+  /// Blurred lamp: where the ray is nearest to it, by its variances there.
+  void blurred_hit(const BlurredAreaEmitter& emitter, const Ray<T>& ray) {
+    const auto [y, variance] = emitter.approach(ray);
+    for (int i = 0; i < 3; ++i) sink_.add(y[i], S(1.0 / variance[i]));
+  }
+
   /// Spot: the direction against the covariance of its cone.
   void point_connection(const Emitter& emitter, const Vec3<T>& wo, const T&) {
     if (const auto* spot = std::get_if<SpotEmitter>(&emitter))

@@ -6,6 +6,7 @@
 ///   f = W(v_0) prod_free f_s(x_k; -v_{k-1}, v_k) |n_k . v_k|
 ///              prod_delta {R_k or (1 - R_k) eta^-2}  L_end,
 ///   L_end = L_e                      free direction that hits an emitter or the environment
+///           L_e g (1 - q / 10)^3     free direction to a BlurredAreaEmitter
 ///           L_e cos_y / r^2          connection to a point y on an area emitter
 ///           I / r^2                  connection to a point emitter
 ///           I falloff(-w) / r^2      connection to a spot emitter, in the direction w
@@ -54,6 +55,11 @@ class ContributionVisitor : public WalkVisitor<T> {
       color_ *= map->eval(v);
     else
       color_ *= constant<T>(std::get<ConstantEnvironment>(emitter).radiance);
+  }
+  void blurred_hit(const BlurredAreaEmitter& emitter, const Ray<T>& ray) {
+    const bool shines = emitter.shines({value(ray.origin), value(ray.direction)});
+    color_ *= constant<T>(shines ? emitter.sharp().radiance : Rgbd{0, 0, 0});
+    if (shines) log_scale_ += emitter.log_share(ray);
   }
   void area_connection(const AreaEmitter& emitter, const T& cosine, const T& r2) {
     using std::log;

@@ -184,8 +184,125 @@ class EnvironmentMap {
   double total_ = 0;
 };
 
+/// Where a lamp is, and how far it extends.
+struct LampExtent {
+  Vec3d center{0, 0, 0};
+  /// Rows: the principal axes of a uniform point on it, and its variances along them.
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  Vec3d variance{0, 0, 0};
+  Vec3d normal{0, 0, 0};  ///< of a flat lamp, on the side that emits; zero for others
+  double spread = 0;      ///< largest (p - center)^T C^-1 (p - center) on it, C the covariance
+  double reach = 0;       ///< largest distance from the center
+};
+
+/// An area emitter as an image of itself that is blurred by the angle sigma, for the softer levels
+/// of tempered splitting (DESIGN 1.10). It has no surface: any ray may see it on its way. With u
+/// the vector from the centre to the ray's origin, r = |u|, the ray x + t v carries
+///   L g(u) (1 - q / 10)_+^3,   q = min over t >= 0 of y^T Sigma^-1 y,   y = u + t v,
+///   Sigma = a C + sigma^2 r^2 I,   a = max(1, spread / 5),
+/// a lobe of standard deviation sigma and more, as EnvironmentMap::blurred has it. Since q <= 5 on
+/// the lamp itself, it is seen by all rays that meet the lamp. g keeps the power: the area of the
+/// lamp across u is about 4 pi det(P C P)^(1/2), P the projection along u (sphere 3 pi, disk 4 pi,
+/// rectangle 12 times that root), and that of the lobe 2.5 pi det(P Sigma P)^(1/2), so
+///   g = 1.6 (S(C) / S(Sigma))^(1/2),   S(M) = u^T adj(M) u = r^2 det(P M P).
+/// A ray is unobstructed if nothing stands in its way up to the distance r - reach: at all levels
+/// alike, and so for each ray that meets the lamp. A flat lamp emits to its front.
+class BlurredAreaEmitter {
+ public:
+  BlurredAreaEmitter(const AreaEmitter& sharp, const LampExtent& lamp, double sigma);
+
+  const AreaEmitter& sharp() const { return sharp_; }
+
+  /// False where the ray carries nothing, whatever stands in its way.
+  bool shines(const Ray<double>& ray) const;
+  /// How far an unobstructed ray goes.
+  double clearance(const Vec3d& origin) const;
+  /// log of g (1 - q / 10)^3, for a ray on which it shines.
+  template <Scalar T>
+  T log_share(const Ray<T>& ray) const {
+    using std::log;
+    const Vec3<T> u = principal(Vec3<T>(ray.origin - constant<T>(lamp_.center)));
+    const Vec3<T> m = variances(dot(u, u));
+    const Vec3<T> y = nearest(u, principal(ray.direction), m);
+    const T q = sqr(y.x()) / m.x() + sqr(y.y()) / m.y() + sqr(y.z()) / m.z();
+    return log(1.0 - q * 0.1) * 3.0 +
+           log(across(u, constant<T>(lamp_.variance)) / across(u, m)) * 0.5 + kLogPeak;
+  }
+  /// Its derivatives by the origin and by the direction. With D = Sigma^-1 and t the minimum,
+  ///   dq / dx = 2 D y - 2 sigma^2 |D y|^2 u,   dq / dv = 2 t D y.
+  struct Gradient {
+    Vec3d by_origin;
+    Vec3d by_direction;
+  };
+  Gradient log_share_gradient(const Ray<double>& ray) const;
+
+  /// y along the principal axes, where the ray is nearest, and its variances: how closely the lamp
+  /// binds the ray. Variances are those of the ray's value.
+  template <Scalar T>
+  struct Approach {
+    Vec3<T> y;
+    Vec3<Stripped<T>> variance;
+  };
+  template <Scalar T>
+  Approach<T> approach(const Ray<T>& ray) const {
+    using S = Stripped<T>;
+    const Vec3<T> u = principal(Vec3<T>(ray.origin - constant<T>(lamp_.center)));
+    const Vec3<S> at{strip(u.x()), strip(u.y()), strip(u.z())};
+    const Vec3<S> m = variances(dot(at, at));
+    return {nearest(u, principal(ray.direction), m), m};
+  }
+  /// Differentials of that y, along the world's axes: dy = du + t dv + v dt with dt = t_u.du +
+  /// t_v.dv.
+  struct ApproachDifferential {
+    double t;
+    Vec3d t_u;
+    Vec3d t_v;
+  };
+  ApproachDifferential approach_differential(const Ray<double>& ray) const;
+  const Eigen::Matrix3d& axes() const { return lamp_.axes; }
+
+ private:
+  static constexpr double kSupport = 10;
+  static constexpr double kLogPeak = 0.47000362924573563;  // log 1.6
+
+  template <Scalar T>
+  Vec3<T> principal(const Vec3<T>& v) const {
+    return {dot(axis(0), v), dot(axis(1), v), dot(axis(2), v)};
+  }
+  Vec3d axis(int i) const { return lamp_.axes.row(i); }
+  template <Scalar T>
+  Vec3<T> variances(const T& r2) const {
+    const T blur = r2 * sigma2_;
+    return {blur + core_.x(), blur + core_.y(), blur + core_.z()};
+  }
+  /// y = u + t v
+  template <Scalar T, Scalar M>
+  static Vec3<T> nearest(const Vec3<T>& u, const Vec3<T>& v, const Vec3<M>& m) {
+    const T along = u.x() * v.x() / m.x() + u.y() * v.y() / m.y() + u.z() * v.z() / m.z();
+    if (value(along) >= 0.0) return u;
+    const T square = sqr(v.x()) / m.x() + sqr(v.y()) / m.y() + sqr(v.z()) / m.z();
+    return u + scaled(v, T(-along / square));
+  }
+  /// S, of a diagonal matrix
+  template <Scalar T>
+  static T across(const Vec3<T>& u, const Vec3<T>& m) {
+    return sqr(u.x()) * m.y() * m.z() + sqr(u.y()) * m.z() * m.x() + sqr(u.z()) * m.x() * m.y();
+  }
+
+  AreaEmitter sharp_;
+  LampExtent lamp_;
+  double sigma2_;
+  Vec3d core_;  ///< a C
+};
+
 using Emitter = std::variant<AreaEmitter, PointEmitter, ConstantEnvironment, EnvironmentMap,
-                             SpotEmitter, DirectionalEmitter>;
+                             SpotEmitter, DirectionalEmitter, BlurredAreaEmitter>;
+
+/// The area emitter that it is, sharp or blurred; null for others.
+inline const AreaEmitter* area_of(const Emitter& emitter) {
+  const auto* blurred = std::get_if<BlurredAreaEmitter>(&emitter);
+  return blurred != nullptr ? &blurred->sharp() : std::get_if<AreaEmitter>(&emitter);
+}
 
 inline bool is_environment(const Emitter& emitter) {
   return std::holds_alternative<ConstantEnvironment>(emitter) ||

@@ -48,6 +48,11 @@ class GradientSweep : RecordedPath<Rules> {
     Vec3d x_bar = Vec3d::Zero();
     Vec3d v_bar = Vec3d::Zero();
     if (topology_.end == PathEnd::Environment) v_bar = environment_adjoint();
+    if (const BlurredAreaEmitter* lamp = this->blurred()) {
+      const auto by = Rules::blurred(*lamp, this->last_ray());
+      x_bar = by.by_origin;
+      v_bar = by.by_direction;
+    }
     if (topology_.has_light_side()) {
       const Vec3d e_bar = joining_edge();
       light_side(e_bar, block);

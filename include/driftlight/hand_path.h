@@ -70,6 +70,9 @@ struct Recorder : WalkVisitor<double> {
     color *= x.factor.color;
   }
   void hit(const AreaEmitter& emitter, const double&, const double&) { color *= emitter.radiance; }
+  void blurred_hit(const BlurredAreaEmitter& emitter, const Ray<double>&) {
+    color *= emitter.sharp().radiance;
+  }
   void environment(const Emitter& emitter, const Vec3d& v) {
     last_v = v;
     const auto* map = std::get_if<EnvironmentMap>(&emitter);
@@ -172,6 +175,12 @@ class RecordedPath {
     return scene_.shapes()[std::get<AreaEmitter>(emitter()).shape];
   }
   const SpotEmitter* spot() const { return std::get_if<SpotEmitter>(&emitter()); }
+  /// Null if the last ray does not go to one.
+  const BlurredAreaEmitter* blurred() const { return std::get_if<BlurredAreaEmitter>(&emitter()); }
+  /// The ray that leaves the last vertex.
+  Ray<double> last_ray() const {
+    return {path_.origin(path_.count), path_.count == 0 ? path_.v0 : vertex(path_.count - 1).wo};
+  }
   Vec3d connection_point() const {
     return topology_.end == PathEnd::AreaConnection ? path_.end : position_of(emitter());
   }

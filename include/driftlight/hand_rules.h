@@ -38,6 +38,7 @@
 ///   connection       w = e / r, e = y - x:  dw = (I - w w^T) de / r, d log r^2 = 2 w.de / r
 ///                    log cos_y, cos_y = -n_y.w:  d = -(n_y.dw + w.dn_y) / cos_y          (H18)
 ///   spot             log falloff(-w):  -(d falloff / dv)(-w) / falloff . dw              (H23)
+///   blurred lamp     log g (1 - q / 10)^3, as of BlurredAreaEmitter                       (H27)
 /// Light side, w_i toward the emitter:
 ///   free             log |n_g.w_o| / |n_g.w_i|:
 ///                    (n_g.dw_o + w_o.dn_g) / n_g.w_o - (n_g.dw_i + w_i.dn_g) / n_g.w_i
@@ -435,6 +436,12 @@ struct HandRules {
   static Vec3d spot(const SpotEmitter& spot, const Vec3d& w) {
     const Vec3d v = -w;
     return -spot.falloff_gradient(v) / spot.falloff(v);
+  }
+
+  /// (H27): derivatives of log_share by the two parts of the ray.
+  static BlurredAreaEmitter::Gradient blurred(const BlurredAreaEmitter& lamp,
+                                              const Ray<double>& ray) {
+    return lamp.log_share_gradient(ray);
   }
 
   /// (H25): gradient of log n.v by v, and with the arguments exchanged by n.

@@ -11,6 +11,8 @@
 ///   spot    r = w_o: with its share of (H18)
 ///   emission, of an area r = v - c n, c = n.v: (H20);  of a spot r = v;  the point by its own
 ///   residuals, on the disk across parallel light r = y / R                                (H26)
+///   blurred lamp, y = u + t v at the ray's nearest point, widths fixed:
+///           dy = du + t dv + v dt, dt as of BlurredAreaEmitter::approach_differential     (H28)
 /// The two directions of the joining edge, w_o = w and w_i = -w, have dw of (H18) with dx and dy of
 /// both its ends.
 #pragma once
@@ -378,14 +380,30 @@ class StageSweep : RecordedPath<Rules> {
       add(std::sqrt(map->precision(path_.last_v)) / 3.0, dv);
       return;
     }
+    if (const BlurredAreaEmitter* lamp = this->blurred()) return blurred_end(*lamp);
     const Hit& hit_at = topology_.vertices[topology_.scatter_count].hit;
     const Shape& shape = scene_.shapes()[hit_at.shape];
-    const Vec3d& from = path_.origin(path_.count);
-    const Vec3d& v = path_.count == 0 ? path_.v0 : vertex(path_.count - 1).wo;
+    const auto [from, v] = this->last_ray();
     const double length = (path_.end - from).dot(v);
     const Vec3d n = surface_normal(shape.geometry, hit_at.primitive, path_.end);
     const double cosine = Rules::hit_cosine(shape.geometry, from, v, n);
     position(shape, hit(v, n, cosine, length));
+  }
+
+  /// (H28)
+  void blurred_end(const BlurredAreaEmitter& lamp) {
+    const Ray<double> ray = this->last_ray();
+    const auto [t, t_u, t_v] = lamp.approach_differential(ray);
+    Columns du = Columns::zero();
+    du.set(columns_.xi, ray_.xi_t);
+    du.set(columns_.xi + 1, ray_.xi_b);
+    Columns dv = Columns::zero();
+    dv.set(columns_.omega, ray_.omega_t);
+    dv.set(columns_.omega + 1, ray_.omega_b);
+    const Columns dy = du + t * dv + outer(ray.direction, dot(t_u, du) + dot(t_v, dv));
+    const Vec3d variance = lamp.approach(ray).variance;
+    for (int i = 0; i < 3; ++i)
+      add(1.0 / (3.0 * std::sqrt(variance[i])) * dot(Vec3d(lamp.axes().row(i)), dy));
   }
 
   static Vec3d surface_normal(const Geometry& geometry, std::uint32_t primitive, const Vec3d& p) {

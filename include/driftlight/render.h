@@ -70,6 +70,9 @@ struct KernelStatistics {
 struct LevelFigures {
   std::uint64_t particles = 0;  ///< that came to it
   std::uint64_t died = 0;       ///< that went no further
+  /// Sums of r = (target of the next level) / (target of this one) and of r^2, over particles.
+  double ratio = 0;
+  double squared_ratio = 0;
   KernelStatistics steps;
   Rejections rejections;
 

@@ -57,9 +57,9 @@ class Scene {
   Scene& operator=(Scene&&) noexcept;
 
   const PerspectiveCamera& camera() const { return camera_; }
-  std::span<const Shape> shapes() const { return shapes_; }
-  std::span<const Material> materials() const { return materials_; }
-  std::span<const Bsdf> bsdfs() const { return bsdfs_; }
+  std::span<const Shape> shapes() const { return surfaces_->shapes; }
+  std::span<const Material> materials() const { return surfaces_->materials; }
+  std::span<const Bsdf> bsdfs() const { return surfaces_->bsdfs; }
   std::span<const Emitter> emitters() const { return emitters_; }
   std::optional<std::uint32_t> environment() const { return environment_; }
   /// Bounding sphere of all shapes and finite emitters.
@@ -81,7 +81,7 @@ class Scene {
   /// The point where the ray meets the primitive of a valid hit.
   template <Scalar T>
   Interaction<T> interact(const Hit& hit, const Ray<T>& ray) const {
-    const Shape& shape = shapes_[hit.shape];
+    const Shape& shape = shapes()[hit.shape];
     return driftlight::interact(shape.geometry, hit.primitive, ray, shape.textured);
   }
 
@@ -89,16 +89,18 @@ class Scene {
   /// opaque surface the normals of `at` are turned toward wi.
   template <Scalar T>
   const Bsdf* bsdf_at(const Hit& hit, const Vec3<T>& wi, Interaction<T>& at) const {
-    const Material& material = materials_[shapes_[hit.shape].material];
-    const Bsdf& front = bsdfs_[material.front];
+    const Material& material = materials()[shapes()[hit.shape].material];
+    const Bsdf& front = bsdfs()[material.front];
     if (value(dot(at.n_g, wi)) > 0.0 || is_transmissive(front)) return &front;
     if (!material.back) return nullptr;
     at.n_g = -at.n_g;
     at.n_s = -at.n_s;
-    return &bsdfs_[*material.back];
+    return &bsdfs()[*material.back];
   }
 
-  /// Probability with which emitter sampling picks the emitter.
+  /// False if no emitter can be drawn from, as all are blurred.
+  bool samples_emitters() const { return emitter_choice_.total() > 0.0; }
+  /// Probability with which emitter sampling picks the emitter; 0 of blurred ones.
   double emitter_probability(std::uint32_t emitter) const {
     return emitter_choice_.probability(static_cast<int>(emitter));
   }
@@ -108,30 +110,37 @@ class Scene {
   /// Uniform point on the shape of an area emitter, density 1 / area.
   EmitterPoint sample_area(const AreaEmitter& emitter, double u1, double u2) const;
 
+  bool is_blurred(std::uint32_t emitter) const {
+    return std::holds_alternative<BlurredAreaEmitter>(emitters_[emitter]);
+  }
+  /// The same surfaces, which both share, under other emitters: each in the place of that of the
+  /// same index, on the same shape or also at infinity.
+  Scene with_emitters(std::vector<Emitter> emitters) const;
+
  private:
   friend class SceneBuilder;
   struct Accelerator;
+  struct Surfaces {
+    std::vector<Shape> shapes;
+    std::vector<Material> materials;
+    std::vector<Bsdf> bsdfs;
+  };
   Scene();
+  void choose_emitters_by_power();
 
   PerspectiveCamera camera_;
-  std::vector<Shape> shapes_;
-  std::vector<Material> materials_;
-  std::vector<Bsdf> bsdfs_;
+  std::shared_ptr<Surfaces> surfaces_;
   std::vector<Emitter> emitters_;
   std::optional<std::uint32_t> environment_;
   DiscreteDistribution emitter_choice_;
   Vec3d center_{0, 0, 0};
   double radius_ = 1;
-  std::unique_ptr<Accelerator> accelerator_;
+  std::shared_ptr<const Accelerator> accelerator_;
 };
 
 /// Collects the parts of a scene. Indices are returned in order from 0.
 class SceneBuilder {
  public:
-  SceneBuilder() = default;
-  /// Begins with copies of all parts of a scene, which keep their indices.
-  explicit SceneBuilder(const Scene& scene);
-
   std::uint32_t add_bsdf(Bsdf bsdf);
   std::uint32_t add_material(const Material& material);
   /// With `radiance` the shape is an area emitter. Throws InputError on an empty mesh or one whose
@@ -144,11 +153,6 @@ class SceneBuilder {
   /// A ConstantEnvironment or EnvironmentMap. Throws InputError on a second one.
   void set_environment(Emitter environment);
   void set_camera(const PerspectiveCamera& camera);
-
-  /// In the place of the BSDF of this index.
-  void replace_bsdf(std::uint32_t index, Bsdf bsdf);
-  /// In the place of the one that was set.
-  void replace_environment(Emitter environment);
 
   /// Throws InputError if there is no emitter or no light. The builder is empty afterwards.
   Scene build();

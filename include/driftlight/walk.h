@@ -43,6 +43,8 @@ struct WalkVisitor {
   /// The ends. `cosine` is that of the emitter's normal and `r2` the squared length of the edge.
   void hit(const AreaEmitter&, const T& /*cosine*/, const T& /*r2*/) {}
   void environment(const Emitter&, const Vec3<T>& /*v*/) {}
+  /// In the place of `hit`, and of `position` there.
+  void blurred_hit(const BlurredAreaEmitter&, const Ray<T>&) {}
   void area_connection(const AreaEmitter&, const T& /*cosine*/, const T& /*r2*/) {}
   /// A point or spot emitter; `wo` is the unit direction toward it.
   void point_connection(const Emitter&, const Vec3<T>& /*wo*/, const T& /*r2*/) {}
@@ -301,6 +303,10 @@ void walk(const Scene& scene, const PathTopology& topology, const Blocks& blocks
   const Emitter& emitter = scene.emitters()[topology.emitter];
   if (topology.end == PathEnd::Environment) {
     visitor.environment(emitter, ray.direction);
+    return;
+  }
+  if (const auto* blurred = std::get_if<BlurredAreaEmitter>(&emitter)) {
+    visitor.blurred_hit(*blurred, ray);
     return;
   }
   const PathVertex& last = topology.vertices[topology.scatter_count];

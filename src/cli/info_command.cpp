@@ -88,8 +88,8 @@ void run(const InfoCommand& command) {
   const Scene& scene = loaded.scene;
   constexpr std::array<std::string_view, 6> kBsdfs{
       "diffuse", "conductor", "roughconductor", "dielectric", "roughdielectric", "phong"};
-  constexpr std::array<std::string_view, 6> kEmitters{"area",   "point", "constant",
-                                                      "envmap", "spot",  "directional"};
+  constexpr std::array<std::string_view, 7> kEmitters{
+      "area", "point", "constant", "envmap", "spot", "directional", "blurred area"};
   std::string text = row("scene", command.scene.file.string());
   text += row("film",
               fmt::format("{} x {} pixels", scene.camera().film_width, scene.camera().film_height));
