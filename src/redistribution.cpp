@@ -213,7 +213,7 @@ class RedistributionSampler {
   void split_sample(const Vec2d& film, double weight, Rng& rng) {
     double family = 0.0;
     splitter_.sample(film, common_.plan, rng,
-                     [&](LobeSequence, const Share& share, const Rgbd& color, double visit) {
+                     [&](LobeSequence, int, const Share& share, const Rgbd& color, double visit) {
                        const double amount = weight * visit;
                        family += visit;
                        common_.split_film.splat(share.film, color,

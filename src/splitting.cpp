@@ -150,7 +150,7 @@ struct Splitter::Particles {
     last.start_at(topology, coordinates, c, share);
     last.run(static_cast<std::uint64_t>(steps), rng,
              [&](const Share& at, const Rgbd& color, double weight) {
-               (*visit)(sequence, at, color, weight * deposit / steps);
+               (*visit)(sequence, number, at, color, weight * deposit / steps);
              });
   }
 
@@ -164,6 +164,7 @@ struct Splitter::Particles {
   std::vector<LevelFigures> figures;
   std::vector<Start> starts;
   const Visit* visit = nullptr;
+  int number = 0;  ///< of the particle under way, among those of this sample
 };
 
 /// Finds starts among the paths of one sample.
@@ -215,6 +216,7 @@ void Splitter::sample(const Vec2d& film, const SplittingPlan& plan, Rng& rng, co
   Particles& particles = *particles_;
   particles.visit = &visit;
   particles.starts.clear();
+  particles.number = 0;
   Particles::Sink sink{scenes_[top], brightness_,     plan, options_.phase_space, film,
                        rng,          particles.starts};
   tracer_.sample(film, rng, sink);
@@ -224,6 +226,7 @@ void Splitter::sample(const Vec2d& film, const SplittingPlan& plan, Rng& rng, co
     for (int i = 0; i < start.count; ++i) {
       particles.level(top).enter(start.topology, start.coordinates, c);
       particles.descend(top, plan.deposit * start.factor, rng);
+      ++particles.number;
     }
   }
 }

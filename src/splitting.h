@@ -40,8 +40,10 @@ struct SplittingPlan {
 /// Runs the particles of one sample after the other. A copy shares nothing but references.
 class Splitter {
  public:
-  /// A visit to level 0, `amount` in units of the brightness m.
-  using Visit = std::function<void(LobeSequence, const Share&, const Rgbd& color, double amount)>;
+  /// A visit to level 0, `amount` in units of the brightness m, by a descendant of a particle of
+  /// this number among those that the sample has started.
+  using Visit = std::function<void(LobeSequence, int particle, const Share&, const Rgbd& color,
+                                   double amount)>;
 
   /// All references must outlive it, `layers` too unless it is null.
   Splitter(const TemperedScenes& scenes, const EmissionGuide& top_guide,

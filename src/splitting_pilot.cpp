@@ -6,13 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 namespace driftlight {
 namespace {
 
 constexpr std::uint64_t kTask = 64;
-/// Weight of the pilot's particles.
+/// Weight of the pilot's particles; and where samples are to start several of them.
 constexpr double kPilotDeposit = 4.0;
+constexpr double kLightDeposit = 2.0;
 /// Most that two successive levels may differ: E[r^2] = 16 / 7, that of a blur to a fourth of the
 /// area by (1 - q)^3, and a little more.
 constexpr double kMostSpread = 0.9;
@@ -23,13 +25,15 @@ constexpr double kWorth = 20.0;
 /// Least noise to be saved, in units of the squared brightness: that of the samples themselves is
 /// about 1.
 constexpr double kLeastSaving = 0.05;
-/// Least deposit of a visit, in units of the brightness of a pixel's sample.
+/// Least deposit of a visit, in units of the brightness of a pixel's sample: below it more visits
+/// no longer pay. Most deposit of a particle.
 constexpr double kLeastDeposit = 0.2;
+constexpr double kMostDeposit = 64.0;
 /// What a step costs in samples of the scene.
 constexpr double kStepCost = 0.3;
 /// Fewest and most samples of the top level for each of the scene.
 constexpr double kFewest = 0.02;
-constexpr double kMost = 4.0;
+constexpr double kMost = 8.0;
 
 /// Sums over samples.
 struct Noise {
@@ -41,6 +45,7 @@ struct PilotRun {
   std::map<LobeSequence, Noise> noise;
   double steps = 0;   ///< of all particles
   double pixels = 0;  ///< sum of F_p^2 over the pixels p, F_p what a family brings to one
+  double alone = 0;   ///< the same sum over the particles of each sample one by one
   std::vector<LevelFigures> levels;
 
   PilotRun& operator+=(const PilotRun& other) {
@@ -50,6 +55,7 @@ struct PilotRun {
     }
     steps += other.steps;
     pixels += other.pixels;
+    alone += other.alone;
     levels.resize(std::max(levels.size(), other.levels.size()));
     for (std::size_t k = 0; k < other.levels.size(); ++k) levels[k] += other.levels[k];
     return *this;
@@ -74,19 +80,25 @@ PilotRun run_task(const Setup& pilot, const SplittingPlan& plan, std::uint64_t f
   Splitter splitter = pilot.splitter;
   std::map<LobeSequence, double> family;
   std::map<int, double> pixels;
+  std::map<std::pair<int, int>, double> alone;  ///< by particle and pixel
   for (std::uint64_t i = first; i < first + kTask; ++i) {
     Rng rng(pilot.seed, Stream::SplittingPilot, i);
     const Vec2d film = rng.uniform2();
     family.clear();
     pixels.clear();
-    splitter.sample(film, plan, rng,
-                    [&](LobeSequence sequence, const Share& share, const Rgbd&, double amount) {
-                      family[sequence] += amount;
-                      pixels[pilot.pixel(share.film)] += amount;
-                      result.noise[sequence].remainder += amount * (share.w - pilot.tau);
-                    });
+    alone.clear();
+    splitter.sample(
+        film, plan, rng,
+        [&](LobeSequence sequence, int particle, const Share& share, const Rgbd&, double amount) {
+          const int pixel = pilot.pixel(share.film);
+          family[sequence] += amount;
+          pixels[pixel] += amount;
+          alone[{particle, pixel}] += amount;
+          result.noise[sequence].remainder += amount * (share.w - pilot.tau);
+        });
     for (const auto& [sequence, sum] : family) result.noise[sequence].families += sum * sum;
     for (const auto& [pixel, sum] : pixels) result.pixels += sum * sum;
+    for (const auto& [place, sum] : alone) result.alone += sum * sum;
   }
   result.levels = splitter.take_figures();
   for (const LevelFigures& level : result.levels)
@@ -125,6 +137,19 @@ void leave_out_levels(const std::vector<LevelFigures>& figures, TemperedScenes& 
   }
 }
 
+/// Deposit and rate, from a run by light particles.
+void set_effort(const PilotRun& run, double samples, int last_steps, SplittingPlan& plan) {
+  const double a = run.alone / (samples * kLightDeposit);
+  const double b = (run.pixels - run.alone) / samples;
+  // Work per deposit does not depend on it.
+  const double work = kStepCost * run.steps * kLightDeposit / samples;
+  const double best = a > 0.0 ? std::sqrt(b * work / a) : kMostDeposit;
+  const double least = kLeastDeposit * last_steps;
+  plan.deposit = std::clamp(best, least, std::max(least, kMostDeposit));
+  const double noise = a * plan.deposit + b;
+  plan.rate = std::clamp(std::sqrt(noise / (1.0 + work / plan.deposit)), kFewest, kMost);
+}
+
 }  // namespace
 
 SplittingPlan plan_splitting(TemperedScenes& scenes, const Splitter& prototype,
@@ -143,17 +168,10 @@ SplittingPlan plan_splitting(TemperedScenes& scenes, const Splitter& prototype,
     saved += noise.remainder - noise.families;
   }
   if (!plan.all && saved < kLeastSaving * count) return {};
-  PilotRun second = run(pilot, plan, samples, samples);
-  if (!options.splitting.levels) {
-    leave_out_levels(second.levels, scenes);
-    second = run(pilot, plan, 2 * samples, samples);
-  }
-  // Work per particle does not depend on the deposit.
-  const double steps = kPilotDeposit * second.steps / count;
-  plan.deposit = std::max(kLeastDeposit * options.splitting.last_steps,
-                          steps / options.redistribution.mutations_per_sample);
-  const double cost = 1.0 + kStepCost * steps / plan.deposit;
-  plan.rate = std::clamp(std::sqrt(second.pixels / count / cost), kFewest, kMost);
+  if (!options.splitting.levels)
+    leave_out_levels(run(pilot, plan, samples, samples).levels, scenes);
+  plan.deposit = kLightDeposit;
+  set_effort(run(pilot, plan, 2 * samples, samples), count, options.splitting.last_steps, plan);
   return plan;
 }
 

@@ -22,8 +22,11 @@ namespace driftlight {
 ///
 /// Splitting's samples are as many for each sample of the scene as make the error least in a given
 /// time: with variances V, v and costs C, c of the samples of the scene and of the top level, their
-/// numbers are as sqrt(V / C) to sqrt(v / c). Here V is about C about 1, and v the sum of F_p^2
-/// over pixels p, F_p what a family brings to one.
+/// numbers are as sqrt(V / C) to sqrt(v / c), for an error as (sqrt(V C) + sqrt(v c))^2. Here V is
+/// about C about 1, and v the sum of F_p^2 over pixels p, F_p what a family brings to one. The
+/// particles of a sample are independent: with their deposit e, A e of v comes from each of them
+/// alone, and B from what those of one sample have in common, while c = 1 + D / e. So v c is least
+/// for e = sqrt(B D / A).
 ///
 /// The levels of the prototype are `scenes`, of which those that are not needed are left out,
 /// unless the options say how many there are; the prototype must not have run.
