@@ -137,12 +137,12 @@ void leave_out_levels(const std::vector<LevelFigures>& figures, TemperedScenes& 
   }
 }
 
-/// Deposit and rate, from a run by light particles.
+/// Deposit and rate, from a run by the plan as it is.
 void set_effort(const PilotRun& run, double samples, int last_steps, SplittingPlan& plan) {
-  const double a = run.alone / (samples * kLightDeposit);
+  const double a = run.alone / (samples * plan.deposit);
   const double b = (run.pixels - run.alone) / samples;
   // Work per deposit does not depend on it.
-  const double work = kStepCost * run.steps * kLightDeposit / samples;
+  const double work = kStepCost * run.steps * plan.deposit / samples;
   const double best = a > 0.0 ? std::sqrt(b * work / a) : kMostDeposit;
   const double least = kLeastDeposit * last_steps;
   plan.deposit = std::clamp(best, least, std::max(least, kMostDeposit));
@@ -171,7 +171,10 @@ SplittingPlan plan_splitting(TemperedScenes& scenes, const Splitter& prototype,
   if (!options.splitting.levels)
     leave_out_levels(run(pilot, plan, samples, samples).levels, scenes);
   plan.deposit = kLightDeposit;
-  set_effort(run(pilot, plan, 2 * samples, samples), count, options.splitting.last_steps, plan);
+  // Twice, as a sample starts only so many particles: one of great weight hides what it costs.
+  for (const std::uint64_t round : {2, 3})
+    set_effort(run(pilot, plan, round * samples, samples), count, options.splitting.last_steps,
+               plan);
   return plan;
 }
 
