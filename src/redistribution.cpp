@@ -99,10 +99,10 @@ struct Redistribution {
       result.rejections += level.rejections;
     }
     result.mutations = result.small_step.proposed;
-    if (!plan.takes_any()) return result;
+    if (!plan.some) return result;
     result.split_deposit = plan.deposit;
     result.split_rate = plan.rate;
-    result.split_sequences = plan.sequences.size();
+    result.split_sequences = plan.known;
     const double sum = families_.value();
     if (sum > 0.0) result.effective_families = sum * sum / squared_families_.value();
     return result;
@@ -130,7 +130,7 @@ class RedistributionSampler {
     Sink sink{*this, film, film_sink};
     tracer_.sample(film, rng, sink);
     for (const Start& start : starts_) spread(start, rng);
-    if (common_.plan.takes_any()) split(film, rng);
+    if (common_.plan.some) split(film, rng);
   }
 
  private:

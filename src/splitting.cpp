@@ -26,7 +26,7 @@ Copies copies(double ratio, Rng& rng) {
 }  // namespace
 
 bool SplittingPlan::takes(LobeSequence sequence) const {
-  return all || std::binary_search(sequences.begin(), sequences.end(), sequence);
+  return some && !std::binary_search(left.begin(), left.end(), sequence);
 }
 
 /// The particle at one level above the last.

@@ -28,12 +28,12 @@ namespace driftlight {
 
 /// Which paths are left to splitting, and in which portions.
 struct SplittingPlan {
-  bool all = false;
-  std::vector<LobeSequence> sequences = {};  ///< in order; if not all
-  double deposit = 1;                        ///< e
-  double rate = 1;                           ///< samples of the top level for each of the scene
+  bool some = false;                    ///< else none
+  std::vector<LobeSequence> left = {};  ///< in order: those that are not, if some are
+  std::size_t known = 0;                ///< sequences that are, and that the pilot has seen
+  double deposit = 1;                   ///< e
+  double rate = 1;                      ///< samples of the top level for each of the scene
 
-  bool takes_any() const { return all || !sequences.empty(); }
   bool takes(LobeSequence sequence) const;
 };
 

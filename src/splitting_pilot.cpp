@@ -158,16 +158,19 @@ SplittingPlan plan_splitting(TemperedScenes& scenes, const Splitter& prototype,
   const auto tasks = static_cast<std::uint64_t>(options.splitting.pilot) / kTask;
   const std::uint64_t samples = std::max<std::uint64_t>(1, tasks) * kTask;
   const auto count = static_cast<double>(samples);
-  const SplittingPlan everything{.all = true, .deposit = kPilotDeposit};
+  const SplittingPlan everything{.some = true, .deposit = kPilotDeposit};
   const PilotRun first = run(pilot, everything, 0, samples);
-  SplittingPlan plan{.all = options.splitting.all, .deposit = kPilotDeposit};
+  SplittingPlan plan = everything;
   double saved = 0.0;
   for (const auto& [sequence, noise] : first.noise) {
-    if (!plan.all && noise.remainder < kWorth * noise.families) continue;
-    plan.sequences.push_back(sequence);
+    if (!options.splitting.all && noise.remainder < kWorth * noise.families) {
+      plan.left.push_back(sequence);
+      continue;
+    }
+    ++plan.known;
     saved += noise.remainder - noise.families;
   }
-  if (!plan.all && saved < kLeastSaving * count) return {};
+  if (!options.splitting.all && saved < kLeastSaving * count) return {};
   if (!options.splitting.levels)
     leave_out_levels(run(pilot, plan, samples, samples).levels, scenes);
   plan.deposit = kLightDeposit;

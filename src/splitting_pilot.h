@@ -15,7 +15,8 @@ namespace driftlight {
 ///   E[r^2] = int q (w - tau)_+^2 = int pi_0 (w - tau)_+,
 /// which the particles of level 0 know too, and far better than samples that seldom find these
 /// paths. Splitting takes the sequences for which the first is far the smaller, if the noise that
-/// it saves matters beside that of the samples' own share.
+/// it saves matters beside that of the samples' own share. Then it also takes those that the pilot
+/// has not seen: if samples find one of them, then by a rare event that chains would spread.
 ///
 /// Levels that little depends on are left out: with d = log E[r^2] / E[r]^2 of the ratio r between
 /// two levels, about the sum of those in between, d is at most that of halving a blur.
