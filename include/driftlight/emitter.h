@@ -225,7 +225,7 @@ class BlurredAreaEmitter {
     const Vec3<T> m = variances(dot(u, u));
     const Vec3<T> y = nearest(u, principal(ray.direction), m);
     const T q = sqr(y.x()) / m.x() + sqr(y.y()) / m.y() + sqr(y.z()) / m.z();
-    return log(1.0 - q * 0.1) * 3.0 +
+    return log(1.0 - q * (1.0 / kSupport)) * 3.0 +
            log(across(u, constant<T>(lamp_.variance)) / across(u, m)) * 0.5 + kLogPeak;
   }
   /// Its derivatives by the origin and by the direction. With D = Sigma^-1 and t the minimum,
