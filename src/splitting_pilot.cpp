@@ -175,7 +175,7 @@ SplittingPlan plan_splitting(TemperedScenes& scenes, const Splitter& prototype,
     leave_out_levels(run(pilot, plan, samples, samples).levels, scenes);
   plan.deposit = kLightDeposit;
   // Twice, as a sample starts only so many particles: one of great weight hides what it costs.
-  for (const std::uint64_t round : {2, 3})
+  for (std::uint64_t round = 2; round <= 3; ++round)
     set_effort(run(pilot, plan, round * samples, samples), count, options.splitting.last_steps,
                plan);
   return plan;

@@ -381,14 +381,21 @@ TEST_F(Cli, TimeEndsTheRender) {
 }
 
 TEST_F(Cli, ASignalEndsTheRenderWithTheImageSoFar) {
-  for (const auto& [integrator, signal] :
-       {std::pair("langevin", SIGINT), std::pair("path", SIGTERM), std::pair("bdpt", SIGINT)}) {
-    Process process = on_terminal({"render", "scene.xml", "--integrator", integrator, "--time",
-                                   "3600", "-o", "a.exr", "--stats", "s.json"});
+  struct Case {
+    std::vector<std::string> integrator;
+    int signal;
+  };
+  // A short pilot, as there is no image before its end.
+  for (const Case& stopped : {Case{{"langevin", "--set", "pilot=1024"}, SIGINT},
+                              Case{{"path"}, SIGTERM}, Case{{"bdpt"}, SIGINT}}) {
+    std::vector<std::string> arguments{"render", "scene.xml", "--time", "3600",        "-o",
+                                       "a.exr",  "--stats",   "s.json", "--integrator"};
+    arguments.insert(arguments.end(), stopped.integrator.begin(), stopped.integrator.end());
+    Process process = on_terminal(arguments);
     // The bar counts down from an hour: a second has passed.
     ASSERT_TRUE(process.wait_for(" 59:59 left", std::chrono::seconds(60)))
         << process.standard_error();
-    process.send(signal);
+    process.send(stopped.signal);
     EXPECT_EQ(process.exit_code(), 0);
     EXPECT_NE(process.standard_error().find("stopped early"), std::string::npos)
         << process.standard_error();
