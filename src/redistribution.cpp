@@ -5,6 +5,7 @@
 #include <cmath>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "driftlight/error.h"
@@ -16,7 +17,7 @@
 #include "probed_starts.h"
 #include "remainder.h"
 #include "sample_film.h"
-#include "splitting_pilot.h"
+#include "splitting_share.h"
 
 namespace driftlight {
 namespace {
@@ -35,15 +36,12 @@ struct Redistribution {
   StepLayers* layers;
   Pilot pilot;
   Remainder remainder;
-  Film film;        ///< of the chains, in units of `unit`
-  Film split_film;  ///< of the particles, likewise
-  double unit;      ///< bright enough that fixed point does not overflow
-  double deposit;   ///< epsilon
+  Film film;       ///< of the chains, in units of `unit`
+  double unit;     ///< bright enough that fixed point does not overflow
+  double deposit;  ///< epsilon
   ExactSum remainders;
   std::optional<ProbedStarts> probed;  ///< if gradients are checked
-  TemperedScenes levels;
-  EmissionGuide top_guide;
-  SplittingPlan plan;
+  SplittingShare splitting;
 
   Redistribution(const Scene& of_scene, const LangevinOptions& with, const RenderOptions& render)
       : scene(of_scene),
@@ -52,22 +50,10 @@ struct Redistribution {
         pilot(run_pilot(scene, options, render.seed)),
         remainder(scene, pilot.guide, pilot.brightness, options.redistribution.threshold),
         film(scene.camera().film_width, scene.camera().film_height),
-        split_film(scene.camera().film_width, scene.camera().film_height),
         unit(64.0 * pilot.brightness.max()),
         deposit(kLeastDeposit),
-        levels(scene,
-               options.mode == Mode::Splitting ? options.splitting.levels : std::optional(0)),
-        top_guide(levels[levels.top()]) {
+        splitting(scene, options, render, remainder, pilot.brightness, unit) {
     if (render.check_gradients) probed.emplace(scene, options, render.seed);
-    if (levels.top() > 0) plan = plan_splitting(levels, splitter(), options, render.seed);
-  }
-
-  Splitter splitter() const {
-    return {levels, top_guide, options, remainder, pilot.brightness, layers};
-  }
-
-  bool leaves_to_splitting(const PathTopology& path) const {
-    return levels.carry(path) && plan.takes(LobeSequence(path));
   }
 
   /// From the mean remainder of a sample so far.
@@ -83,54 +69,34 @@ struct Redistribution {
     statistics_.rejections += figures.rejections;
     ++statistics_.starts;
   }
-  /// What the particles of one sample have brought, in units of the brightness about.
-  void count_family(double sum, const std::vector<LevelFigures>& figures) {
-    families_.add(sum / plan.deposit);
-    squared_families_.add(sum * sum / (plan.deposit * plan.deposit));
-    const std::lock_guard lock(mutex_);
-    statistics_.levels.resize(std::max(statistics_.levels.size(), figures.size()));
-    for (std::size_t k = 0; k < figures.size(); ++k) statistics_.levels[k] += figures[k];
-  }
+  /// Of the chains.
   LangevinStatistics statistics() const {
     LangevinStatistics result = statistics_;
     result.small_step.accepted = accepted_.value();
-    for (const LevelFigures& level : result.levels) {
-      result.small_step += level.steps;
-      result.rejections += level.rejections;
-    }
-    result.mutations = result.small_step.proposed;
-    if (!plan.some) return result;
-    result.split_deposit = plan.deposit;
-    result.split_rate = plan.rate;
-    result.split_sequences = plan.known;
-    const double sum = families_.value();
-    if (sum > 0.0) result.effective_families = sum * sum / squared_families_.value();
     return result;
   }
 
  private:
   ExactSum accepted_;
-  ExactSum families_;  ///< in particles
-  ExactSum squared_families_;
   std::mutex mutex_;
   LangevinStatistics statistics_;
 };
 
-/// One bidirectional sample, then the chains that start from it.
+/// One bidirectional sample, the chains that start from it, and the particles beside it.
 class RedistributionSampler {
  public:
   explicit RedistributionSampler(Redistribution& common)
       : common_(common),
         tracer_(common.scene, common.pilot.guide, MisHeuristic::Balance, common.options.max_depth),
         chain_(common.scene, common.options.kernel, common.remainder, common.layers),
-        splitter_(common.splitter()) {}
+        splitting_(common.splitting) {}
 
   void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& film_sink) {
     starts_.clear();
     Sink sink{*this, film, film_sink};
     tracer_.sample(film, rng, sink);
     for (const Start& start : starts_) spread(start, rng);
-    if (common_.plan.some) split(film, rng);
+    splitting_.sample(film, rng);
   }
 
  private:
@@ -170,7 +136,7 @@ class RedistributionSampler {
     start.share = common_.remainder.share(start.topology, start.coordinates, start.contribution);
     if (!std::isfinite(start.share.log_remainder)) return 1.0;
     start.remainder = path.roulette * (start.share.w - tau);
-    if (!common_.leaves_to_splitting(start.topology)) starts_.push_back(start);
+    if (!common_.splitting.takes(start.topology)) starts_.push_back(start);
     return tau / start.share.w;
   }
 
@@ -204,30 +170,30 @@ class RedistributionSampler {
     if (probe) common_.probed->take(*probe);
   }
 
-  /// The remainder that is left to splitting.
-  void split(const Vec2d& film, Rng& rng) {
-    const double rate = common_.plan.rate;
-    const double samples = std::floor(rate + rng.uniform());
-    for (double i = 0; i < samples; ++i) split_sample(film, 1.0 / rate, rng);
-  }
-  void split_sample(const Vec2d& film, double weight, Rng& rng) {
-    double family = 0.0;
-    splitter_.sample(film, common_.plan, rng,
-                     [&](LobeSequence, int, const Share& share, const Rgbd& color, double visit) {
-                       const double amount = weight * visit;
-                       family += visit;
-                       common_.split_film.splat(share.film, color,
-                                                amount * share.brightness / common_.unit);
-                     });
-    common_.count_family(family, splitter_.take_figures());
-  }
-
   Redistribution& common_;
   BidirectionalTracer tracer_;
   RemainderChain chain_;
-  Splitter splitter_;
+  SplittingShare::Sampler splitting_;
   std::vector<Start> starts_;
 };
+
+/// What each way of carrying light has on the film, and the families of particles.
+Layers shares(const Image& samples, const Image& chains, const Image& particles,
+              const FamilyTiles& families) {
+  Layers layers{.width = samples.width, .height = samples.height, .names = {}, .values = {}};
+  for (const char* name : {"samples", "chains", "particles"})
+    for (const char* channel : {".R", ".G", ".B"})
+      layers.names.push_back(std::string(name) + channel);
+  layers.names.emplace_back("families");
+  for (int y = 0; y < layers.height; ++y) {
+    for (int x = 0; x < layers.width; ++x) {
+      for (const Image* image : {&samples, &chains, &particles})
+        for (int c = 0; c < 3; ++c) layers.values.push_back(image->pixel(x, y)[c]);
+      layers.values.push_back(static_cast<float>(families.effective(x, y)));
+    }
+  }
+  return layers;
+}
 
 }  // namespace
 
@@ -248,19 +214,22 @@ LangevinResult render_redistribution(const Scene& scene, const LangevinOptions& 
       });
 
   LangevinResult result;
-  result.statistics = common.statistics();
-  if (common.probed) result.gradient_check = common.probed->table();
-  result.image = film.image(samples.samples_per_pixel);
-  const double unit = common.unit / std::max(1.0, samples.samples_per_pixel);
-  const Image chains = common.film.develop(unit);
-  const Image particles = common.split_film.develop(unit);
+  const Image carried = film.image(samples.samples_per_pixel);
+  const Image chains = common.film.develop(common.unit / std::max(1.0, samples.samples_per_pixel));
+  const Image particles = common.splitting.image(samples.samples_per_pixel);
+  result.image = carried;
   for (std::size_t i = 0; i < chains.rgb.size(); ++i)
     result.image.rgb[i] += chains.rgb[i] + particles.rgb[i];
+  if (render.shares != nullptr)
+    *render.shares = shares(carried, chains, particles, common.splitting.families());
+  result.statistics = common.statistics();
+  common.splitting.report(particles, result.statistics);
+  result.statistics.mutations = result.statistics.small_step.proposed;
+  if (common.probed) result.gradient_check = common.probed->table();
   result.statistics.b = mean_luminance(result.image);
   if (!(result.statistics.b > 0.0) && !samples.stopped)
     throw InputError("no path from the sensor to an emitter carries light");
   result.statistics.remainder = mean_luminance(chains);
-  result.statistics.split = mean_luminance(particles);
   result.statistics.samples_per_pixel = samples.samples_per_pixel;
   result.statistics.stopped = samples.stopped;
   result.statistics.bootstrap_seconds = pilot_seconds;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// `driftlight render --layers` as users meet it.
+/// `driftlight render --layers` and `--shares` as users meet them.
 #include <OpenImageIO/imageio.h>
 #include <gtest/gtest.h>
 
@@ -80,6 +80,26 @@ TEST_F(LayersCli, WritesNamedChannelsAndTheSameImage) {
   EXPECT_EQ(spec.get_string_attribute("driftlight:integrator"), "langevin");
 }
 
+TEST_F(LayersCli, SharesAreNamedChannelsAndTheSameImage) {
+  const std::vector<std::string> work{"--spp", "2", "--seed", "3"};
+  std::vector<std::string> with{"-o", "with.exr", "--shares", "shares.exr"};
+  with.insert(with.end(), work.begin(), work.end());
+  std::vector<std::string> without{"-o", "without.exr"};
+  without.insert(without.end(), work.begin(), work.end());
+  const Outcome outcome = render(with);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("wrote shares.exr"), std::string::npos) << outcome.out;
+  ASSERT_EQ(render(without).exit_code, 0);
+  EXPECT_TRUE(read("with.exr") == read("without.exr"));
+  const auto input = OIIO::ImageInput::open((folder() / "shares.exr").string());
+  ASSERT_TRUE(input);
+  const std::vector<std::string>& names = input->spec().channelnames;
+  EXPECT_EQ(
+      std::set<std::string>(names.begin(), names.end()),
+      (std::set<std::string>{"samples.R", "samples.G", "samples.B", "chains.R", "chains.G",
+                             "chains.B", "particles.R", "particles.G", "particles.B", "families"}));
+}
+
 TEST_F(LayersCli, MistakesAreNamedBeforeAnythingIsRendered) {
   struct Mistake {
     std::vector<std::string> arguments;
@@ -92,6 +112,10 @@ TEST_F(LayersCli, MistakesAreNamedBeforeAnythingIsRendered) {
       {{"--layers", "nowhere/layers.exr"}, {"nowhere"}},
       {{"--layers", "a.exr", "-o", "a.exr"}, {"--layers", "'a.exr'"}},
       {{"--layers"}, {"--layers"}},
+      {{"--shares", "shares.png"}, {"--shares", "'shares.png'", ".exr"}},
+      {{"--shares", "shares.exr", "--integrator", "bdpt"}, {"--shares", "langevin"}},
+      {{"--shares", "shares.exr", "--set", "mode=chain"}, {"--shares", "mode=redistribution"}},
+      {{"--shares", "nowhere/shares.exr"}, {"nowhere"}},
   };
   const std::set<std::string> before = files();
   for (const Mistake& mistake : mistakes) {

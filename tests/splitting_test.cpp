@@ -9,6 +9,7 @@
 #include "driftlight/phase_space.h"
 #include "driftlight/render.h"
 #include "driftlight/scene_check.h"
+#include "family_tiles.h"
 #include "lobe_sequence.h"
 #include "support/test_scenes.h"
 #include "support/tiles.h"
@@ -265,6 +266,57 @@ TEST(Splitting, DoesNotDependOnThreads) {
     EXPECT_EQ(one.statistics.mutations, other.statistics.mutations);
     EXPECT_EQ(one.statistics.effective_families, other.statistics.effective_families);
   }
+}
+
+/// Samples, chains and particles add up to the image, and families are counted where particles are.
+TEST(Splitting, SharesAddUpToTheImage) {
+  const Scene scene = pane();
+  Layers shares;
+  RenderOptions how;
+  how.seed = 5;
+  how.shares = &shares;
+  const LangevinResult result = render_langevin(scene, splitting(), how, 4);
+  ASSERT_EQ(shares.names,
+            (std::vector<std::string>{"samples.R", "samples.G", "samples.B", "chains.R", "chains.G",
+                                      "chains.B", "particles.R", "particles.G", "particles.B",
+                                      "families"}));
+  EXPECT_EQ(result.image.rgb, render(scene, splitting(), 2).image.rgb);
+  const std::size_t channels = shares.names.size();
+  ASSERT_EQ(shares.values.size(), result.image.rgb.size() / 3 * channels);
+  double particles = 0.0;
+  for (std::size_t pixel = 0; pixel < shares.values.size() / channels; ++pixel) {
+    const float* value = &shares.values[pixel * channels];
+    for (std::size_t c = 0; c < 3; ++c)
+      ASSERT_FLOAT_EQ(value[c] + (value[3 + c] + value[6 + c]), result.image.rgb[3 * pixel + c]);
+    const Rgbd by_particles(value[6], value[7], value[8]);
+    ASSERT_TRUE(luminance(by_particles) == 0.0 || value[9] > 0.999F);
+    particles += luminance(by_particles);
+  }
+  const LangevinStatistics& statistics = result.statistics;
+  EXPECT_NEAR(particles * 3.0 / static_cast<double>(result.image.rgb.size()) / statistics.split,
+              1.0, 1e-5);
+  EXPECT_GT(statistics.split_of_few_families, 0.0);
+  EXPECT_LE(statistics.split_of_few_families, statistics.split);
+}
+
+/// Of families with equal sums their number; (1 + 3)^2 / (1 + 9) of two others.
+TEST(FamilyTiles, CountWhatANumberOfEqualFamiliesWouldBe) {
+  FamilyTiles tiles(40, 20);
+  const int first = tiles.at(Vec2d(0.1, 0.2));
+  const int last = tiles.at(Vec2d(0.99, 0.99));
+  EXPECT_NE(first, last);
+  EXPECT_EQ(tiles.at(Vec2d(0.81, 0.81)), last);
+  for (int i = 0; i < 7; ++i) tiles.add(first, 0.5);
+  tiles.add(last, 1.0);
+  tiles.add(last, 3.0);
+  EXPECT_NEAR(tiles.effective(0, 0), 7.0, 1e-5);
+  EXPECT_NEAR(tiles.effective(15, 15), 7.0, 1e-5);
+  EXPECT_NEAR(tiles.effective(39, 19), 1.6, 1e-5);
+  EXPECT_EQ(tiles.effective(16, 0), 0.0);
+  Image grey(40, 20);
+  for (float& x : grey.rgb) x = 2.0F;
+  EXPECT_NEAR(tiles.luminance_of_fewer(5.0, grey), 2.0 * (800.0 - 256.0) / 800.0, 1e-5);
+  EXPECT_EQ(tiles.luminance_of_fewer(0.0, grey), 0.0);
 }
 
 /// Where a scene has nothing sharp, or no levels are wanted, it is redistribution, bit for bit.

@@ -45,6 +45,11 @@ struct RenderOptions {
   /// light and T from the sensor, for all max_depth (max_depth + 3) / 2 - 1 strategies; rendering
   /// them takes 24 bytes a strategy and pixel.
   Layers* strategies = nullptr;
+  /// Receives from the Langevin sampler, but for Mode::Chain, who carries what of the image, if not
+  /// null: channels samples, chains and particles, each with .R, .G, .B, whose sum is the image;
+  /// and families, the effective number of families of particles that the tile of 16 x 16 pixels
+  /// about it rests on.
+  Layers* shares = nullptr;
 };
 
 /// Why proposals of the small step were rejected.
@@ -107,6 +112,9 @@ struct LangevinStatistics {
   std::size_t split_sequences = 0;  ///< lobe sequences that are left to them
   /// (sum F)^2 / (sum F^2) over families, F what all particles of one sample bring.
   double effective_families = 0;
+  /// Part of `split` in tiles of 16 x 16 pixels that rest on fewer than 16 effective families, and
+  /// so have a standard error of more than a fourth.
+  double split_of_few_families = 0;
   double bootstrap_seconds = 0;
   double render_seconds = 0;
   bool stopped = false;

@@ -64,6 +64,7 @@ struct Raw {
   std::string statistics;
   std::string layers;
   std::string strategies;
+  std::string shares;
   bool check_gradients = false;
   std::string paths = "20000";
   std::string max_depth;
@@ -118,6 +119,11 @@ void declare_render(CLI::App& app, Raw& raw) {
   app.add_option("--strategies", raw.strategies,
                  "write what each strategy of the bdpt integrator adds to the image: channels "
                  "sStT.R, sStT.G, sStT.B with S vertices from the light and T from the sensor")
+      ->type_name("FILE.exr");
+  app.add_option("--shares", raw.shares,
+                 "write who carries what of the image of the langevin integrator: channels "
+                 "samples, chains and particles, each with .R, .G, .B, and families, the effective "
+                 "number of families of particles about a pixel")
       ->type_name("FILE.exr");
   app.add_flag("--check-gradients", raw.check_gradients,
                "check the derivatives at a random sample of the states of the langevin integrator");
@@ -225,6 +231,7 @@ RenderCommand render_command(const Raw& raw) {
   if (!raw.statistics.empty()) command.statistics = raw.statistics;
   command.layers = layers_file("--layers", raw.layers, Integrator::Langevin, command);
   command.strategies = layers_file("--strategies", raw.strategies, Integrator::Bdpt, command);
+  command.shares = layers_file("--shares", raw.shares, Integrator::Langevin, command);
   command.check_gradients = raw.check_gradients;
   if (command.check_gradients && command.integrator != Integrator::Langevin)
     throw UsageError("--check-gradients is for the langevin integrator");

@@ -45,6 +45,7 @@ struct RenderCommand {
   std::optional<std::filesystem::path> statistics;
   std::optional<std::filesystem::path> layers;      ///< ends in .exr
   std::optional<std::filesystem::path> strategies;  ///< ends in .exr
+  std::optional<std::filesystem::path> shares;      ///< ends in .exr
   bool check_gradients = false;
   Verbosity verbosity = Verbosity::Normal;
 };

@@ -76,6 +76,7 @@ void check_outputs(const RenderCommand& command) {
   if (command.statistics) check_target(*command.statistics);
   if (command.layers) check_target(*command.layers);
   if (command.strategies) check_target(*command.strategies);
+  if (command.shares) check_target(*command.shares);
 }
 
 /// Shows nothing if quiet, the rest by degrees.
@@ -125,6 +126,8 @@ void check_settings(const RenderCommand& command, const Options& options) {
       throw UsageError(
           "--mutations-per-pixel is for mode=chain; mode=splitting and mode=redistribution take "
           "--spp");
+    if (chain && command.shares)
+      throw UsageError("--shares is for mode=splitting and mode=redistribution");
     const KernelOptions& kernel = options.kernel;
     if (command.check_gradients && kernel.drift == Drift::None &&
         kernel.preconditioner == PreconditionerKind::Identity)
@@ -147,6 +150,10 @@ void write_outputs(const RenderCommand& command, const Image& image, const Rende
   if (render.strategies != nullptr) {
     write_layers(*command.strategies, *render.strategies, report.metadata);
     report.summary.push_back(fmt::format("wrote {}", command.strategies->string()));
+  }
+  if (render.shares != nullptr) {
+    write_layers(*command.shares, *render.shares, report.metadata);
+    report.summary.push_back(fmt::format("wrote {}", command.shares->string()));
   }
   report.statistics["seconds"]["write"] = watch.seconds();
   if (command.statistics) {
@@ -189,6 +196,8 @@ void render(const RenderCommand& command) {
   }
   Layers strategies;
   if (command.strategies) how.strategies = &strategies;
+  Layers shares;
+  if (command.shares) how.shares = &shares;
   const auto result = [&] {
     ProgressBar bar(!talk.quiet());
     how.progress = [&](const Progress& progress) { bar.update(progress); };
@@ -197,6 +206,7 @@ void render(const RenderCommand& command) {
   Report report = report_of(command, result, options, option_entries, how);
   if (report.empty) throw RuntimeError("stopped before there was an image; nothing is written");
   if (report.stopped) talk.notice("stopped early: the image holds what was rendered so far");
+  for (const std::string& warning : report.warnings) talk.notice(warning);
   report.statistics["seconds"]["load"] = load_seconds;
   write_outputs(command, result.image, how, report, talk);
   if (!report.failure.empty()) throw RuntimeError(report.failure);

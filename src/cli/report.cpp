@@ -121,6 +121,9 @@ void report_redistribution(const LangevinStatistics& s, const Image& image, Repo
                   s.b > 0.0 ? 100.0 * s.remainder / s.b : 0.0, s.starts)};
 }
 
+/// Part of an image's light, resting on few families, from which on users are warned.
+constexpr double kDoubtful = 0.01;
+
 Json to_json(const LevelFigures& level) {
   return {{"particles", level.particles},
           {"died", level.died},
@@ -137,6 +140,7 @@ void report_splitting(const LangevinStatistics& s, Report& report) {
                                     {"rate", s.split_rate},
                                     {"lobe_sequences", s.split_sequences},
                                     {"effective_families", s.effective_families},
+                                    {"mean_of_few_families", s.split_of_few_families},
                                     {"levels", levels}};
   if (s.split_sequences == 0) {
     report.summary.emplace_back("splitting: nothing to gain, left to redistribution");
@@ -147,6 +151,11 @@ void report_splitting(const LangevinStatistics& s, Report& report) {
       "{:.3g} samples for each of the scene",
       s.b > 0.0 ? 100.0 * s.split / s.b : 0.0, s.effective_families, s.split_sequences,
       s.split_rate));
+  if (s.split_of_few_families > kDoubtful * s.b)
+    report.warnings.push_back(fmt::format(
+        "{:.0f} % of the light rests on so few families of particles that tiles of 16 x 16 pixels "
+        "are uncertain by more than a fourth; --shares tells where, a longer render helps",
+        100.0 * s.split_of_few_families / s.b));
   for (std::size_t k = s.levels.size(); k-- > 0;) {
     const LevelFigures& level = s.levels[k];
     report.details.push_back(fmt::format(

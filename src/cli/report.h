@@ -16,11 +16,12 @@ struct Report {
   /// that the same seed and work give the same file.
   std::map<std::string, std::string> metadata;
   nlohmann::ordered_json statistics;
-  std::vector<std::string> summary;  ///< lines
-  std::vector<std::string> details;  ///< lines, for -v
-  bool stopped = false;              ///< ended early
-  bool empty = false;                ///< ended before there was an image
-  std::string failure;               ///< what went wrong, if anything did
+  std::vector<std::string> summary;   ///< lines
+  std::vector<std::string> details;   ///< lines, for -v
+  std::vector<std::string> warnings;  ///< of an image that is not to be trusted yet
+  bool stopped = false;               ///< ended early
+  bool empty = false;                 ///< ended before there was an image
+  std::string failure;                ///< what went wrong, if anything did
 };
 
 /// `entries` are the options that were used, with their values.
