@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "strategy_weights.h"
@@ -23,6 +24,14 @@ struct FoundPath {
   double roulette;
 };
 
+/// Where a sample's random numbers come from: for its subpath from the sensor, that from the light,
+/// and the points on emitters that the former connects to.
+struct SampleNumbers {
+  Rng& sensor;
+  Rng& light;
+  Rng& connection;
+};
+
 /// Reports each path that it finds to the sink:
 ///   add(value, path)           for the film point that the sample was asked for,
 ///   splat(film, value, path)   for another one, s > 1 and t = 1.
@@ -31,10 +40,10 @@ class BidirectionalTracer {
  public:
   /// Light subpaths begin as the guide says, which must outlive it.
   BidirectionalTracer(const Scene& scene, const EmissionGuide& guide, MisHeuristic heuristic,
-                      int max_depth)
+                      int max_depth, Roulette roulette = Roulette::On)
       : scene_(scene),
         guide_(guide),
-        tracer_(scene, guide, heuristic),
+        tracer_(scene, guide, heuristic, roulette),
         weights_(guide, heuristic),
         max_depth_(max_depth) {
     for (std::uint32_t i = 0; i < scene.emitters().size(); ++i)
@@ -43,16 +52,18 @@ class BidirectionalTracer {
 
   template <class Sink>
   void sample(const Vec2d& film, Rng& rng, Sink& sink) {
-    v_ = scene_.camera().direction(film);
-    const auto escape = tracer_.trace(Walk::FromSensor, tracer_.leave_sensor(v_),
-                                      RayFollower(scene_, v_), max_depth_, rng, from_sensor_);
-    if (scene_.samples_emitters()) trace_from_light(rng);
+    sample(film, SampleNumbers{rng, rng, rng}, sink);
+  }
+  template <class Sink>
+  void sample(const Vec2d& film, const SampleNumbers& numbers, Sink& sink) {
+    const auto escape = trace_from_sensor(film, max_depth_, numbers.sensor);
+    if (scene_.samples_emitters()) trace_from_light(max_depth_ - 1, numbers.light);
     for (int t = 2; t < from_sensor_.size() + 2; ++t) {
       const SubpathVertex& z = from_sensor_[t - 2];
       hit_area(z, t, sink);
       if (t > 2) see_blurred(z, t, sink);
       if (z.delta || t > max_depth_) continue;
-      if (scene_.samples_emitters()) connect_to_light(z, t, rng, sink);
+      if (scene_.samples_emitters()) connect_to_light(z, t, numbers.connection, sink);
       for (int s = 2; s < from_light_.size() + 2 && s + t <= max_depth_ + 1; ++s)
         if (!from_light_[s - 2].delta) connect(z, t, from_light_[s - 2], s, sink);
     }
@@ -64,15 +75,41 @@ class BidirectionalTracer {
       if (!from_light_[s - 2].delta) connect_to_sensor(from_light_[s - 2], s, sink);
   }
 
+  /// What strategy (s, t) alone finds, with its weight among all. Blurred lamps are not seen.
+  template <class Sink>
+  void sample_strategy(int s, int t, const Vec2d& film, const SampleNumbers& numbers, Sink& sink) {
+    if (s < 2 && t < 2) return;
+    from_sensor_.clear();
+    const auto escape = t > 1 ? trace_from_sensor(film, t - 1, numbers.sensor) : std::nullopt;
+    if (s > 1) {
+      if (!scene_.samples_emitters()) return;
+      trace_from_light(s - 1, numbers.light);
+      if (from_light_.size() < s - 1 || from_light_[s - 2].delta) return;
+      if (t == 1) return connect_to_sensor(from_light_[s - 2], s, sink);
+    }
+    if (s == 0 && escape && from_sensor_.size() == t - 2) return hit_environment(*escape, sink);
+    if (from_sensor_.size() < t - 1) return;
+    const SubpathVertex& z = from_sensor_[t - 2];
+    if (s == 0) return hit_area(z, t, sink);
+    if (z.delta) return;
+    if (s > 1) return connect(z, t, from_light_[s - 2], s, sink);
+    if (scene_.samples_emitters()) connect_to_light(z, t, numbers.connection, sink);
+  }
+
   /// The first ray of the light subpath of the last sample.
   const Emission& emission() const { return emission_; }
 
  private:
-  void trace_from_light(Rng& rng) {
+  std::optional<Departure> trace_from_sensor(const Vec2d& film, int max_size, Rng& rng) {
+    v_ = scene_.camera().direction(film);
+    return tracer_.trace(Walk::FromSensor, tracer_.leave_sensor(v_), RayFollower(scene_, v_),
+                         max_size, rng, from_sensor_);
+  }
+  void trace_from_light(int max_size, Rng& rng) {
     emission_ = guide_.sample(rng);
     tracer_.trace(Walk::FromLight, tracer_.leave_light(emission_),
                   RayFollower(scene_, emission_.origin, emission_.start, emission_.direction),
-                  max_depth_ - 1, rng, from_light_);
+                  max_size, rng, from_light_);
   }
 
   template <class Sink>

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "driftlight/error.h"
+#include "systematic_resampling.h"
 
 namespace driftlight {
 namespace {
@@ -63,21 +64,12 @@ std::vector<PathSampler::Sample> Bootstrap::resample(int chains) const {
     throw InputError("no path from the sensor to an emitter carries light (" +
                      std::to_string(weights_.size()) + " samples tried)");
   Rng rng(seed_, Stream::Resampling, 0);
-  const double offset = rng.uniform();
   std::vector<PathSampler::Sample> result;
   result.reserve(static_cast<std::size_t>(chains));
-  double cumulative = 0;
-  for (std::size_t i = 0; i < weights_.size(); ++i) {
-    cumulative += weights_[i];
-    const double reached = cumulative / mean_.sum * chains;
-    while (static_cast<int>(result.size()) < chains &&
-           static_cast<double>(result.size()) + offset < reached) {
-      Rng replay(seed_, Stream::Bootstrap, i);
-      result.push_back(sampler_.sample(replay).value());
-    }
+  for (const std::size_t i : systematic_resampling(weights_, chains, rng.uniform())) {
+    Rng replay(seed_, Stream::Bootstrap, i);
+    result.push_back(sampler_.sample(replay).value());
   }
-  // Rounding of the last sum may leave one out.
-  while (static_cast<int>(result.size()) < chains) result.push_back(result.back());
   return result;
 }
 

@@ -97,6 +97,20 @@ OptionEntry max_depth(int& field) {
   return number("max_depth", field, Range<int>{1, kMaxPathLength}, "longest path, in edges");
 }
 
+// Of all integrators with chains.
+OptionEntry direct(DirectLight& field) {
+  return choice("direct", field, std::array<std::string_view, 2>{"chain", "apart"},
+                "paths of 1 and 2 edges: by the chains, or by a path tracer in a pass of its own");
+}
+OptionEntry chains(int& field) {
+  return number("chains", field, Range<int>{1, 1000000},
+                "independent chains; the image depends on it, not on the threads");
+}
+OptionEntry bootstrap(int& field) {
+  return number("bootstrap", field, Range<int>{1, 1000000000},
+                "samples that find the mean brightness and start the chains");
+}
+
 /// Every value must survive its own text form, which `set` checks.
 void check(const std::vector<OptionEntry>& entries) {
   for (const OptionEntry& entry : entries) entry.set(entry.get());
@@ -138,8 +152,7 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
                      "probability of an independent proposal; auto: from the bootstrap"),
       choice("large_steps", options.large_steps, std::array<std::string_view, 2>{"path", "bdpt"},
              "where independent proposals come from: the sensor, or both ends"),
-      choice("direct", options.direct, std::array<std::string_view, 2>{"chain", "apart"},
-             "paths of 1 and 2 edges: by the chains, or by a path tracer in a pass of its own"),
+      direct(options.direct),
       number("threshold", redistribution.threshold, positive,
              "redistribution: samples keep so many times the local brightness"),
       number("chain_length", redistribution.chain_length, Range<int>{1, 1000000},
@@ -160,10 +173,8 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
              "splitting: steps of a particle in the scene itself"),
       number("splitting_pilot", splitting.pilot, Range<int>{64, 1000000000},
              "splitting: samples of each round of its pilot"),
-      number("chains", options.chains, Range<int>{1, 1000000},
-             "independent chains; the image depends on it, not on the threads"),
-      number("bootstrap", options.bootstrap, Range<int>{1, 1000000000},
-             "samples that find the mean brightness and start the chains"),
+      chains(options.chains),
+      bootstrap(options.bootstrap),
       max_depth(options.max_depth),
   };
 }
@@ -180,6 +191,20 @@ std::vector<OptionEntry> entries(BdptOptions& options) {
 }
 
 std::vector<OptionEntry> entries(LightOptions& options) { return {max_depth(options.max_depth)}; }
+
+std::vector<OptionEntry> entries(PrimaryOptions& options) {
+  const Range<double> size{.low = 0, .high = 1, .open = true};
+  return {
+      number("large_step_probability", options.large_step_probability, Range<double>{0, 1},
+             "probability of drawing all numbers anew"),
+      number("step_min", options.step_min, size, "least size of a small step, at most step_max"),
+      number("step_max", options.step_max, size, "largest size of a small step"),
+      direct(options.direct),
+      chains(options.chains),
+      bootstrap(options.bootstrap),
+      max_depth(options.max_depth),
+  };
+}
 
 std::string_view name_of(PhaseSpace phase_space) {
   return kPhaseSpaces.at(static_cast<std::size_t>(phase_space));
@@ -203,6 +228,14 @@ void BdptOptions::validate() const {
 void LightOptions::validate() const {
   LightOptions copy = *this;
   check(entries(copy));
+}
+
+void PrimaryOptions::validate() const {
+  PrimaryOptions copy = *this;
+  check(entries(copy));
+  if (step_min > step_max)
+    throw OptionError(
+        fmt::format("option step_min = '{}': must be at most step_max = {}", step_min, step_max));
 }
 
 void set_option(const std::vector<OptionEntry>& entries, const std::string& name,

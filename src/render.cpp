@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "driftlight/render.h"
 
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "chain_loop.h"
+#include "direct_pass.h"
 #include "driftlight/bootstrap.h"
 #include "driftlight/chain.h"
 #include "driftlight/error.h"
 #include "driftlight/film.h"
-#include "path_tracer.h"
 #include "redistribution.h"
 #include "stopwatch.h"
 
@@ -55,124 +54,6 @@ LangevinStatistics& LangevinStatistics::operator+=(const LangevinStatistics& oth
 }
 
 namespace {
-
-constexpr int kDirectDepth = 2;
-
-/// The pass of direct light beside the chains.
-class DirectPass {
- public:
-  DirectPass(const Scene& scene, int max_depth, std::uint64_t seed)
-      : sums_(scene, std::min(kDirectDepth, max_depth), seed) {}
-
-  void pass() {
-    const Stopwatch watch;
-    sums_.pass(passes_++);
-    seconds_ += watch.seconds();
-  }
-  /// Sets the ratio of its time to that of the chains, given their mean luminance. With A / t_d +
-  /// B / t_c the sum of the squared errors, t_d / t_c = sqrt(A / B): the ratio of the brightnesses
-  /// times that of the noise of one sample, about 1 / 4 as a chain needs some ten mutations for
-  /// what an independent sample gives.
-  void set_share(double chain_mean) {
-    ratio_ = chain_mean > 0.0 ? std::clamp(0.25 * mean() / chain_mean, 0.02, 2.0) : 2.0;
-  }
-  double ratio() const { return ratio_; }
-
-  /// Mean luminance so far.
-  double mean() const { return mean_luminance(sums_.image(passes_)); }
-  /// Adds what it has rendered.
-  void finish(LangevinResult& result) const {
-    const Image own = sums_.image(passes_);
-    for (std::size_t i = 0; i < own.rgb.size(); ++i) result.image.rgb[i] += own.rgb[i];
-    result.statistics.direct_mean = mean();
-    result.statistics.direct_samples_per_pixel = static_cast<double>(passes_);
-    result.statistics.direct_seconds = seconds_;
-  }
-  std::uint64_t passes() const { return passes_; }
-  double seconds() const { return seconds_; }
-
- private:
-  PixelSums sums_;
-  std::uint64_t passes_ = 0;
-  double seconds_ = 0;
-  double ratio_ = 0;
-};
-
-/// Runs all chains in rounds, each chain the same number of mutations, and passes of direct light
-/// between them, until the work or the time is used up. Either may be missing.
-class Runner {
- public:
-  Runner(std::vector<std::unique_ptr<Chain>>& chains, DirectPass* direct,
-         const RenderOptions& render, double mutations_per_pixel, double pixels)
-      : chains_(chains),
-        direct_(direct),
-        render_(render),
-        mutations_(static_cast<std::uint64_t>(
-            std::ceil(std::max(1.0, mutations_per_pixel * pixels /
-                                        std::max(1.0, static_cast<double>(chains.size())))))),
-        passes_(direct != nullptr ? static_cast<std::uint64_t>(std::ceil(
-                                        std::max(1.0, direct->ratio() * mutations_per_pixel)))
-                                  : 0) {}
-
-  /// True if it was stopped early.
-  bool run() {
-    while (true) {
-      if (render_.stop != nullptr && render_.stop->load()) return true;
-      const double elapsed = watch_.seconds();
-      const double fraction = render_.time ? elapsed / *render_.time : work_done();
-      if (render_.progress) render_.progress({std::min(fraction, 1.0), elapsed});
-      if (fraction >= 1.0) return false;
-      if (direct_is_due(elapsed))
-        direct_->pass();
-      else
-        round(elapsed);
-    }
-  }
-
- private:
-  double work_done() const {
-    const double chains =
-        chains_.empty() ? 1.0 : static_cast<double>(done_) / static_cast<double>(mutations_);
-    if (direct_ == nullptr) return chains;
-    return std::min(chains, static_cast<double>(direct_->passes()) / static_cast<double>(passes_));
-  }
-
-  bool direct_is_due(double elapsed) const {
-    if (direct_ == nullptr) return false;
-    if (chains_.empty()) return true;
-    if (!render_.time) return direct_->passes() < passes_;
-    return direct_->seconds() < direct_->ratio() / (1.0 + direct_->ratio()) * elapsed;
-  }
-
-  void round(double elapsed) {
-    const Stopwatch watch;
-    std::uint64_t mutations = next_round(elapsed);
-    if (!render_.time) mutations = std::min(mutations, mutations_ - done_);
-    tbb::parallel_for(std::size_t{0}, chains_.size(),
-                      [&](std::size_t i) { chains_[i]->run(mutations); });
-    done_ += mutations;
-    seconds_ += watch.seconds();
-  }
-
-  /// Mutations that take about a tenth of a second, or what is left of the time.
-  std::uint64_t next_round(double elapsed) const {
-    if (done_ == 0) return 16;
-    double seconds = 0.1;
-    if (render_.time) seconds = std::min(seconds, *render_.time - elapsed);
-    const double rate = static_cast<double>(done_) / std::max(seconds_, 1e-6);
-    return static_cast<std::uint64_t>(
-        std::clamp(rate * seconds, 1.0, 16.0 * static_cast<double>(done_)));
-  }
-
-  std::vector<std::unique_ptr<Chain>>& chains_;
-  DirectPass* direct_;
-  const RenderOptions& render_;
-  std::uint64_t mutations_;  ///< of each chain, if no time is given
-  std::uint64_t passes_;     ///< of direct light, if no time is given
-  std::uint64_t done_ = 0;
-  double seconds_ = 0;
-  Stopwatch watch_;
-};
 
 /// The chains with what they are started from.
 struct Chains {
@@ -243,7 +124,7 @@ LangevinResult run_langevin(const Scene& scene, const LangevinOptions& options,
   if (chains.all.empty() && !(direct && direct->mean() > 0.0))
     throw InputError("no path from the sensor to an emitter carries light");
   const bool stopped =
-      Runner(chains.all, direct ? &*direct : nullptr, render, mutations_per_pixel, pixels).run();
+      ChainLoop(chains.all, direct ? &*direct : nullptr, render, mutations_per_pixel, pixels).run();
 
   LangevinResult result;
   LangevinStatistics& statistics = result.statistics;

@@ -141,7 +141,7 @@ std::optional<Departure> SubpathTracer::trace(Walk walk, const Departure& start,
     if (!next || !passes(surface.at, surface.wi, next->wo)) return std::nullopt;
     from = depart(walk, x, *next);
     if ((from.throughput == 0.0).all()) return std::nullopt;
-    if (subpath.size() >= kRouletteDepth) {
+    if (roulette_ == Roulette::On && subpath.size() >= kRouletteDepth) {
       const double survival = std::min(0.95, from.throughput.maxCoeff() / power);
       if (!(rng.uniform() < survival)) return std::nullopt;
       from.throughput /= survival;

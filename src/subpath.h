@@ -91,11 +91,15 @@ class MisPower {
   bool square_;
 };
 
+/// Whether dim subpaths end early, at random.
+enum class Roulette { Off, On };
+
 class SubpathTracer {
  public:
   /// Walks from the light begin as the guide says, which must outlive it.
-  SubpathTracer(const Scene& scene, const EmissionGuide& guide, MisHeuristic heuristic)
-      : scene_(scene), guide_(guide), power_(heuristic) {}
+  SubpathTracer(const Scene& scene, const EmissionGuide& guide, MisHeuristic heuristic,
+                Roulette roulette = Roulette::On)
+      : scene_(scene), guide_(guide), power_(heuristic), roulette_(roulette) {}
 
   /// Leaves the sensor along v. Its throughput makes the path an estimate of the radiance there.
   Departure leave_sensor(const Vec3d& v) const;
@@ -108,8 +112,8 @@ class SubpathTracer {
   /// Leaves a surface along `next`, drawn with `scattering` by the BSDF.
   Departure depart(Walk walk, const SubpathVertex& x, const BsdfSample& next) const;
 
-  /// Walks on by BSDF sampling and Russian roulette until the subpath has `max_size` vertices or
-  /// ends. The departure that left the scene, if one did.
+  /// Walks on by BSDF sampling, and Russian roulette if that is on, until the subpath has
+  /// `max_size` vertices or ends. The departure that left the scene, if one did.
   std::optional<Departure> trace(Walk walk, const Departure& start, RayFollower follower,
                                  int max_size, Rng& rng, Subpath& subpath) const;
 
@@ -117,6 +121,7 @@ class SubpathTracer {
   const Scene& scene_;
   const EmissionGuide& guide_;
   MisPower power_;
+  Roulette roulette_;
 };
 
 /// f_s |n_s . wo| with wi toward the sensor and wo toward the light, as a colour; of BSDFs that are

@@ -104,7 +104,8 @@ struct Mistake {
 const std::vector<Mistake> kRenderMistakes{
     {{"missing.xml"}, {"missing.xml"}},
     {{"broken.xml"}, {"broken.xml:"}},
-    {{"scene.xml", "--integrator", "photons"}, {"'photons'", "langevin", "path", "bdpt", "light"}},
+    {{"scene.xml", "--integrator", "photons"},
+     {"'photons'", "langevin", "pssmlt", "mmlt", "path", "bdpt", "light"}},
     {{"scene.xml", "--set", "speed=1"}, {"'speed'", "drift", "epsilon"}},
     {{"scene.xml", "--set", "drift=sideways"}, {"drift", "'sideways'", "none|gradient|full"}},
     {{"scene.xml", "--set", "epsilon=-1"}, {"epsilon", "'-1'", "> 0"}},
@@ -133,6 +134,8 @@ const std::vector<Mistake> kRenderMistakes{
      {"--mutations-per-pixel", "langevin", "--spp"}},
     {{"scene.xml", "--integrator", "bdpt", "--mutations-per-pixel", "4"},
      {"--mutations-per-pixel", "bdpt", "--spp"}},
+    {{"scene.xml", "--integrator", "mmlt", "--spp", "4"}, {"mmlt", "--mutations-per-pixel"}},
+    {{"scene.xml", "--integrator", "pssmlt", "--set", "step_min=0.5"}, {"step_min", "step_max"}},
     {{"scene.xml", "--time", "1", "--mutations-per-pixel", "4"}, {"only one", "--time"}},
     {{"scene.xml", "--integrator", "path", "--time", "1", "--spp", "4"}, {"only one", "--spp"}},
     {{"scene.xml", "-v", "-q"}, {"-v", "-q"}},
@@ -345,6 +348,8 @@ TEST_F(Cli, TheSameSeedGivesTheSameBytesOnAnyNumberOfThreads) {
   const std::vector<std::vector<std::string>> integrators{
       {"--integrator", "langevin", "--set", "mode=chain", "--mutations-per-pixel", "50"},
       {"--integrator", "langevin", "--spp", "4"},
+      {"--integrator", "pssmlt", "--mutations-per-pixel", "20"},
+      {"--integrator", "mmlt", "--mutations-per-pixel", "20"},
       {"--integrator", "path", "--spp", "4"},
       {"--integrator", "bdpt", "--spp", "4"},
       {"--integrator", "light", "--spp", "4"},
@@ -367,7 +372,7 @@ TEST_F(Cli, TheSameSeedGivesTheSameBytesOnAnyNumberOfThreads) {
 }
 
 TEST_F(Cli, TimeEndsTheRender) {
-  for (const char* integrator : {"langevin", "path", "bdpt", "light"}) {
+  for (const char* integrator : {"langevin", "pssmlt", "mmlt", "path", "bdpt", "light"}) {
     const auto start = std::chrono::steady_clock::now();
     const Outcome outcome = run({"render", "scene.xml", "--integrator", integrator, "--time", "1",
                                  "-o", "a.exr", "--stats", "s.json"});

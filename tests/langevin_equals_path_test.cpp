@@ -190,6 +190,46 @@ std::vector<Case> all_cases() {
 /// Takes the better part of an hour: run it with --gtest_also_run_disabled_tests.
 INSTANTIATE_TEST_SUITE_P(DISABLED_All, LangevinEqualsPath, testing::ValuesIn(all_cases()), name_of);
 
+/// Chains in primary sample space.
+class PrimaryEqualsPath : public testing::TestWithParam<Case> {};
+
+TEST_P(PrimaryEqualsPath, TileMeans) {
+  const auto& [scene, name] = GetParam();
+  const Work& work = works().at(scene);
+  const LoadedScene loaded = load_scene_of(scene);
+  const auto image = [&](std::uint64_t seed) {
+    RenderOptions render;
+    render.seed = seed;
+    const auto with = [&](auto options) {
+      options.bootstrap = work.bootstrap;
+      options.max_depth = loaded.max_depth.value();
+      options.direct = scene == "limelight" ? DirectLight::Chain : DirectLight::Apart;
+      return options;
+    };
+    const double amount = work.mutations_per_pixel;
+    return name == "pssmlt"
+               ? render_pssmlt(loaded.scene, with(PssmltOptions{}), render, amount).image
+               : render_mmlt(loaded.scene, with(MmltOptions{}), render, 2.0 * amount).image;
+  };
+  test::expect_equal_tiles(name, tiles_over_runs(image), traced_tiles(scene), work.resolution);
+}
+
+INSTANTIATE_TEST_SUITE_P(Some, PrimaryEqualsPath,
+                         testing::Values(Case{"cornell_glossy", "mmlt"},
+                                         Case{"limelight", "pssmlt"}, Case{"limelight", "mmlt"},
+                                         Case{"small_hole", "mmlt"}),
+                         name_of);
+
+std::vector<Case> all_primary_cases() {
+  std::vector<Case> cases;
+  for (const auto& scene : works())
+    for (const char* name : {"pssmlt", "mmlt"}) cases.emplace_back(scene.first, name);
+  return cases;
+}
+
+INSTANTIATE_TEST_SUITE_P(DISABLED_All, PrimaryEqualsPath, testing::ValuesIn(all_primary_cases()),
+                         name_of);
+
 /// A point behind glass and mirrors: path tracing finds nothing, and paths have coordinates from
 /// both ends only. Against bidirectional path tracing, without drift and with all of it.
 TEST(LangevinEqualsBdpt, PointCaustic) {

@@ -153,6 +153,30 @@ struct LightOptions {
   void validate() const;
 };
 
+/// Metropolis sampling of primary samples.
+struct PrimaryOptions {
+  /// Probability of drawing all numbers anew.
+  double large_step_probability = 0.3;
+  /// Sizes between which small steps are drawn log-uniformly (Kelemen et al. 2002).
+  double step_min = 1.0 / 1024.0;
+  double step_max = 1.0 / 64.0;
+  DirectLight direct = DirectLight::Apart;
+  /// Independent chains, whatever the number of threads.
+  int chains = 128;
+  /// Samples that estimate the normalization b and start the chains.
+  int bootstrap = 200000;
+  /// Longest path, in edges.
+  int max_depth = 12;
+
+  /// Throws OptionError.
+  void validate() const;
+};
+
+/// Of all strategies together (Kelemen et al. 2002).
+struct PssmltOptions : PrimaryOptions {};
+/// Of one strategy at a time, which is a coordinate (Hachisuka et al. 2014).
+struct MmltOptions : PrimaryOptions {};
+
 /// As options name it.
 std::string_view name_of(PhaseSpace phase_space);
 
@@ -170,6 +194,7 @@ std::vector<OptionEntry> entries(LangevinOptions& options);
 std::vector<OptionEntry> entries(PathOptions& options);
 std::vector<OptionEntry> entries(BdptOptions& options);
 std::vector<OptionEntry> entries(LightOptions& options);
+std::vector<OptionEntry> entries(PrimaryOptions& options);
 
 /// Sets `name` to `value`. Throws OptionError naming the option and the valid ones or values.
 void set_option(const std::vector<OptionEntry>& entries, const std::string& name,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <boost/random/normal_distribution.hpp>
+#include <cassert>
 #include <cstdint>
 #include <pcg_random.hpp>
 
@@ -22,6 +23,15 @@ enum class Stream : std::uint64_t {
   SplittingPilot
 };
 
+/// Uniform numbers in (0, 1) from elsewhere than a generator.
+class UniformSource {
+ public:
+  virtual double next() = 0;
+
+ protected:
+  ~UniformSource() = default;
+};
+
 class Rng {
  public:
   using result_type = pcg32::result_type;
@@ -29,8 +39,14 @@ class Rng {
   Rng(std::uint64_t seed, Stream purpose, std::uint64_t index)
       : engine_(seed, (static_cast<std::uint64_t>(purpose) << 48U) + index) {}
 
+  /// Hands on the numbers of a source, which must outlive it. It has uniform numbers only.
+  explicit Rng(UniformSource& source) : source_(&source) {}
+
   /// Uniform in (0, 1): never 0, never 1.
-  double uniform() { return (static_cast<double>(engine_()) + 0.5) * 0x1p-32; }
+  double uniform() {
+    if (source_ != nullptr) return source_->next();
+    return (static_cast<double>(engine_()) + 0.5) * 0x1p-32;
+  }
   Vec2d uniform2() {
     const double x = uniform();
     return {x, uniform()};
@@ -40,9 +56,13 @@ class Rng {
     return {xy.x(), xy.y(), uniform()};
   }
   /// N(0, 1)
-  double normal() { return normal_(engine_); }
+  double normal() {
+    assert(source_ == nullptr);
+    return normal_(engine_);
+  }
 
  private:
+  UniformSource* source_ = nullptr;
   pcg32 engine_;
   boost::random::normal_distribution<double> normal_;
 };

@@ -135,6 +135,18 @@ struct LangevinResult {
 LangevinResult render_langevin(const Scene& scene, const LangevinOptions& options,
                                const RenderOptions& render, double work);
 
+/// Renders with primary sample space Metropolis light transport (Kelemen, Szirmay-Kalos, Antal and
+/// Csonka 2002): chains of the random numbers of bidirectional path tracing, all of whose
+/// strategies a mutation tries. Statistics as of Mode::Chain. Throws as render_langevin.
+LangevinResult render_pssmlt(const Scene& scene, const PssmltOptions& options,
+                             const RenderOptions& render, double mutations_per_pixel);
+
+/// Renders with multiplexed Metropolis light transport (Hachisuka, Kaplanyan and Dachsbacher 2014):
+/// chains of the random numbers of one strategy, which is a number too, at paths of one length.
+/// Statistics as of Mode::Chain. Throws as render_langevin.
+LangevinResult render_mmlt(const Scene& scene, const MmltOptions& options,
+                           const RenderOptions& render, double mutations_per_pixel);
+
 /// Of an integrator whose samples are independent.
 struct PathResult {
   Image image;

@@ -106,6 +106,14 @@ void run(const IntegratorsCommand& /*command*/) {
             "langevin",
             "Metropolis-adjusted Langevin sampling of light paths (Ershov, Frolov, Nikolaev and "
             "Voloboy 2023, doi 10.20948/prepr-2023-63)") +
+        describe_integrator<PssmltOptions>(
+            "pssmlt",
+            "primary sample space Metropolis light transport with bidirectional path tracing "
+            "(Kelemen, Szirmay-Kalos, Antal and Csonka 2002, doi 10.1111/1467-8659.t01-1-00703)") +
+        describe_integrator<MmltOptions>(
+            "mmlt",
+            "multiplexed Metropolis light transport (Hachisuka, Kaplanyan and Dachsbacher 2014, "
+            "doi 10.1145/2601097.2601138)") +
         describe_integrator<PathOptions>(
             "path",
             "path tracing with next-event estimation (Kajiya 1986, doi 10.1145/15922.15902; "

@@ -36,12 +36,25 @@ int samples_per_pixel(const RenderCommand& command) {
   return command.samples_per_pixel.value_or(kSamplesPerPixel);
 }
 
+double mutations_per_pixel(const RenderCommand& command) {
+  return command.mutations_per_pixel.value_or(kMutationsPerPixel);
+}
+
 LangevinResult render_with(const Scene& scene, const LangevinOptions& options,
                            const RenderOptions& render, const RenderCommand& command) {
-  const double work = options.mode == Mode::Chain
-                          ? command.mutations_per_pixel.value_or(kMutationsPerPixel)
-                          : static_cast<double>(samples_per_pixel(command));
+  const double work = options.mode == Mode::Chain ? mutations_per_pixel(command)
+                                                  : static_cast<double>(samples_per_pixel(command));
   return render_langevin(scene, options, render, work);
+}
+
+LangevinResult render_with(const Scene& scene, const PssmltOptions& options,
+                           const RenderOptions& render, const RenderCommand& command) {
+  return render_pssmlt(scene, options, render, mutations_per_pixel(command));
+}
+
+LangevinResult render_with(const Scene& scene, const MmltOptions& options,
+                           const RenderOptions& render, const RenderCommand& command) {
+  return render_mmlt(scene, options, render, mutations_per_pixel(command));
 }
 
 PathResult render_with(const Scene& scene, const PathOptions& options, const RenderOptions& render,
@@ -65,8 +78,8 @@ Report report_of(const RenderCommand& /*command*/, const LangevinResult& result,
   return make_report(result, options, entries, render);
 }
 
-template <class Options>
-Report report_of(const RenderCommand& command, const PathResult& result, const Options& /*options*/,
+template <class Options, class Result>
+Report report_of(const RenderCommand& command, const Result& result, const Options& /*options*/,
                  const std::vector<OptionEntry>& entries, const RenderOptions& render) {
   return make_report(std::string(name_of(command.integrator)), result, entries, render);
 }
@@ -218,6 +231,10 @@ void run(const RenderCommand& command) {
   switch (command.integrator) {
     case Integrator::Langevin:
       return render<LangevinOptions>(command);
+    case Integrator::Pssmlt:
+      return render<PssmltOptions>(command);
+    case Integrator::Mmlt:
+      return render<MmltOptions>(command);
     case Integrator::Path:
       return render<PathOptions>(command);
     case Integrator::Bdpt:

@@ -84,7 +84,8 @@ std::string path_lengths(const LangevinStatistics& s) {
   return text;
 }
 
-void report_chains(const LangevinStatistics& s, const Image& image, Report& report) {
+void report_chains(const std::string& integrator, const LangevinStatistics& s, const Image& image,
+                   Report& report) {
   report.empty = s.mutations == 0 && !(s.direct_samples_per_pixel > 0.0);
   const auto mutations = static_cast<double>(s.mutations);
   const double rate = per_second(mutations, s.render_seconds - s.direct_seconds);
@@ -92,14 +93,13 @@ void report_chains(const LangevinStatistics& s, const Image& image, Report& repo
       {{"b_error", s.b_error},
        {"large_step_probability", s.large_step_probability},
        {"direct", {{"mean", s.direct_mean}, {"samples_per_pixel", s.direct_samples_per_pixel}}},
-       {"mutations_per_second", rate},
-       {"path_lengths", s.path_length}});
+       {"mutations_per_second", rate}});
   report.statistics["seconds"]["direct"] = s.direct_seconds;
   report.summary = {
-      fmt::format("langevin: {} x {} pixels, {} mutations ({:.4g} per pixel) in {:.2f} s, {:.4g} "
-                  "per second",
-                  image.width, image.height, s.mutations, mutations / pixel_count(image),
-                  s.render_seconds, rate),
+      fmt::format("{}: {} x {} pixels, {} mutations ({:.4g} per pixel) in {:.2f} s, {:.4g} per "
+                  "second",
+                  integrator, image.width, image.height, s.mutations,
+                  mutations / pixel_count(image), s.render_seconds, rate),
       fmt::format("b = {:.6g} +- {:.2g}", s.b, s.b_error)};
   if (s.direct_samples_per_pixel > 0.0)
     report.summary.push_back(
@@ -173,12 +173,11 @@ void report_check(const GradientTable& check, Report& report) {
   if (!failures.empty()) report.failure = cli::describe(failures.front());
 }
 
-}  // namespace
-
-Report make_report(const LangevinResult& result, const LangevinOptions& options,
-                   const std::vector<OptionEntry>& entries, const RenderOptions& render) {
+/// What all report alike that accept and reject.
+Report metropolis_report(const std::string& integrator, const LangevinResult& result,
+                         const std::vector<OptionEntry>& entries, const RenderOptions& render) {
   const LangevinStatistics& s = result.statistics;
-  Report report = common_report("langevin", result.image, entries, render);
+  Report report = common_report(integrator, result.image, entries, render);
   report.stopped = s.stopped;
   report.metadata["driftlight:b"] = fmt::format("{}", s.b);
   report.metadata["driftlight:mutations"] = fmt::format("{}", s.mutations);
@@ -194,15 +193,33 @@ Report make_report(const LangevinResult& result, const LangevinOptions& options,
          {"non_finite", s.rejections.non_finite},
          {"hastings", s.rejections.hastings}}},
        {"seconds", {{"bootstrap", s.bootstrap_seconds}, {"render", s.render_seconds}}}});
-  if (options.mode == Mode::Chain)
-    report_chains(s, result.image, report);
-  else
-    report_redistribution(s, result.image, report);
   report.details = {describe("large steps", s.large_step), describe("small steps", s.small_step),
                     describe(s.rejections, s.small_step.proposed)};
-  if (options.mode == Mode::Chain) report.details.push_back(path_lengths(s));
+  return report;
+}
+
+}  // namespace
+
+Report make_report(const LangevinResult& result, const LangevinOptions& options,
+                   const std::vector<OptionEntry>& entries, const RenderOptions& render) {
+  const LangevinStatistics& s = result.statistics;
+  Report report = metropolis_report("langevin", result, entries, render);
+  if (options.mode == Mode::Chain) {
+    report_chains("langevin", s, result.image, report);
+    report.statistics["path_lengths"] = s.path_length;
+    report.details.push_back(path_lengths(s));
+  } else {
+    report_redistribution(s, result.image, report);
+  }
   if (options.mode == Mode::Splitting) report_splitting(s, report);
   if (result.gradient_check) report_check(*result.gradient_check, report);
+  return report;
+}
+
+Report make_report(const std::string& integrator, const LangevinResult& result,
+                   const std::vector<OptionEntry>& entries, const RenderOptions& render) {
+  Report report = metropolis_report(integrator, result, entries, render);
+  report_chains(integrator, result.statistics, result.image, report);
   return report;
 }
 

@@ -27,6 +27,9 @@ struct Report {
 /// `entries` are the options that were used, with their values.
 Report make_report(const LangevinResult& result, const LangevinOptions& options,
                    const std::vector<OptionEntry>& entries, const RenderOptions& render);
+/// Of chains in primary sample space.
+Report make_report(const std::string& integrator, const LangevinResult& result,
+                   const std::vector<OptionEntry>& entries, const RenderOptions& render);
 Report make_report(const std::string& integrator, const PathResult& result,
                    const std::vector<OptionEntry>& entries, const RenderOptions& render);
 

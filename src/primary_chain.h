@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+/// A Metropolis chain in primary sample space.
+#pragma once
+
+#include <vector>
+
+#include "driftlight/film.h"
+#include "driftlight/render.h"
+#include "driftlight/running_mean.h"
+#include "primary_target.h"
+
+namespace driftlight {
+
+/// Mutations are symmetric, so a move from u to u' is accepted with probability I(u') / I(u). Both
+/// points put what they carry on the film, over I, with weights 1 - a and a.
+class PrimaryChain {
+ public:
+  /// Starts at a point that carries light.
+  PrimaryChain(const PrimaryTarget& target, const PrimaryOptions& options, Film& film,
+               const PrimaryPoint& start, Rng rng);
+
+  void run(std::uint64_t mutations);
+  /// Deposits what the current point has gathered since it was entered.
+  void flush();
+
+  const LangevinStatistics& statistics() const { return statistics_; }
+  int edges() const { return point_.edges; }
+  /// I at all large steps proposed so far: independent estimates of its integral.
+  const RunningMean& weights() const { return weights_; }
+
+ private:
+  struct Place {
+    std::vector<PrimarySplat> splats;
+    double target = 0;
+  };
+
+  void splat(const Place& place, double weight);
+
+  PrimaryTarget target_;
+  double large_step_probability_;
+  Film& film_;
+  Rng rng_;
+  PrimaryPoint point_;
+  Place current_;
+  Place proposed_;
+  double gathered_ = 0;
+  LangevinStatistics statistics_;
+  RunningMean weights_;
+};
+
+}  // namespace driftlight

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Metropolis light transport in primary sample space, of all strategies at once or of one at a
+/// time.
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "chain_loop.h"
+#include "direct_pass.h"
+#include "driftlight/error.h"
+#include "driftlight/render.h"
+#include "primary_chain.h"
+#include "systematic_resampling.h"
+
+namespace driftlight {
+namespace {
+
+using Strategies = PrimaryTarget::Strategies;
+
+/// The chains with what they are started from.
+class PrimaryChains {
+ public:
+  /// No chains if paths of `min_edges` and more carry no light.
+  PrimaryChains(const Scene& scene, const PrimaryOptions& options, Strategies strategies,
+                int min_edges, std::uint64_t seed, Film& film)
+      : options_(options),
+        seed_(seed),
+        strategies_(strategies),
+        min_edges_(min_edges),
+        unguided_(scene),
+        target_(scene, unguided_, strategies, min_edges, options.max_depth) {
+    if (min_edges > options.max_depth) return;
+    weights_.resize(strategies == Strategies::One
+                        ? static_cast<std::size_t>(options.max_depth - min_edges) + 1
+                        : 1);
+    const std::vector<double> values = bootstrap();
+    for (std::size_t i = 0; i < values.size(); ++i) weights_[i % weights_.size()].add(values[i]);
+    if (!(b() > 0.0)) return;
+    Rng rng(seed, Stream::Resampling, 0);
+    for (const std::size_t i : systematic_resampling(values, options.chains, rng.uniform()))
+      all.push_back(std::make_unique<PrimaryChain>(target_, options, film, point(i),
+                                                   Rng(seed, Stream::Chain, all.size())));
+  }
+
+  /// Statistics in the order of the chains: the same for any number of threads.
+  LangevinStatistics finish() {
+    LangevinStatistics sum;
+    for (const auto& chain : all) {
+      chain->flush();
+      sum += chain->statistics();
+      weights_[length_index(*chain)] += chain->weights();
+    }
+    sum.large_step_probability = options_.large_step_probability;
+    sum.b = b();
+    double variance = 0.0;
+    for (const RunningMean& length : weights_) variance += length.error() * length.error();
+    sum.b_error = std::sqrt(variance);
+    return sum;
+  }
+
+  /// The integral of the target, over all lengths.
+  double b() const {
+    double sum = 0.0;
+    for (const RunningMean& length : weights_) sum += length.mean();
+    return sum;
+  }
+
+  std::vector<std::unique_ptr<PrimaryChain>> all;
+
+ private:
+  std::size_t length_index(const PrimaryChain& chain) const {
+    return strategies_ == Strategies::One ? static_cast<std::size_t>(chain.edges() - min_edges_)
+                                          : 0;
+  }
+
+  /// Sample i of the bootstrap, whose lengths take turns.
+  PrimaryPoint point(std::size_t i) const {
+    PrimaryPoint result(options_, seed_, Stream::Bootstrap, i);
+    if (strategies_ == Strategies::One)
+      result.edges = min_edges_ + static_cast<int>(i % weights_.size());
+    return result;
+  }
+
+  /// The target at as many samples of each length.
+  std::vector<double> bootstrap() const {
+    constexpr std::size_t kTask = 256;
+    const std::size_t lengths = weights_.size();
+    const auto wanted = static_cast<std::size_t>(options_.bootstrap);
+    std::vector<double> values((wanted + lengths - 1) / lengths * lengths);
+    tbb::parallel_for(std::size_t{0}, (values.size() + kTask - 1) / kTask, [&](std::size_t task) {
+      PrimaryTarget target = target_;
+      std::vector<PrimarySplat> splats;
+      for (std::size_t i = task * kTask; i < std::min((task + 1) * kTask, values.size()); ++i) {
+        PrimaryPoint at = point(i);
+        values[i] = target(at, splats);
+      }
+    });
+    return values;
+  }
+
+  const PrimaryOptions& options_;
+  std::uint64_t seed_;
+  Strategies strategies_;
+  int min_edges_;
+  EmissionGuide unguided_;
+  PrimaryTarget target_;
+  std::vector<RunningMean> weights_;  ///< of each length, if they are apart
+};
+
+LangevinResult run_chains(const Scene& scene, const PrimaryOptions& options,
+                          const RenderOptions& render, double mutations_per_pixel,
+                          Strategies strategies) {
+  const double pixels = scene.camera().pixel_count();
+  Stopwatch watch;
+  const bool apart = options.direct == DirectLight::Apart;
+  Film film(scene.camera().film_width, scene.camera().film_height);
+  PrimaryChains chains(scene, options, strategies, apart ? kDirectDepth + 1 : 1, render.seed, film);
+  const double bootstrap_seconds = watch.restart();
+  std::optional<DirectPass> direct;
+  if (apart) {
+    direct.emplace(scene, options.max_depth, render.seed);
+    direct->pass();
+    direct->set_share(chains.b());
+  }
+  if (chains.all.empty() && !(direct && direct->mean() > 0.0))
+    throw InputError("no path from the sensor to an emitter carries light");
+  const bool stopped =
+      ChainLoop(chains.all, direct ? &*direct : nullptr, render, mutations_per_pixel, pixels).run();
+
+  LangevinResult result;
+  result.statistics = chains.finish();
+  result.statistics.stopped = stopped;
+  result.statistics.bootstrap_seconds = bootstrap_seconds;
+  result.statistics.render_seconds = watch.seconds();
+  const double count = std::max(1.0, static_cast<double>(result.statistics.mutations));
+  result.image = film.develop(result.statistics.b * pixels / count);
+  if (direct) direct->finish(result);
+  return result;
+}
+
+LangevinResult render_primary(const Scene& scene, const PrimaryOptions& options,
+                              const RenderOptions& render, double mutations_per_pixel,
+                              Strategies strategies) {
+  options.validate();
+  tbb::task_arena arena(render.threads > 0 ? render.threads : tbb::task_arena::automatic);
+  return arena.execute(
+      [&] { return run_chains(scene, options, render, mutations_per_pixel, strategies); });
+}
+
+}  // namespace
+
+LangevinResult render_pssmlt(const Scene& scene, const PssmltOptions& options,
+                             const RenderOptions& render, double mutations_per_pixel) {
+  return render_primary(scene, options, render, mutations_per_pixel, Strategies::All);
+}
+
+LangevinResult render_mmlt(const Scene& scene, const MmltOptions& options,
+                           const RenderOptions& render, double mutations_per_pixel) {
+  return render_primary(scene, options, render, mutations_per_pixel, Strategies::One);
+}
+
+}  // namespace driftlight

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The light of primary samples: the target of chains in primary sample space.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "bidirectional_tracer.h"
+#include "driftlight/options.h"
+#include "primary_sample.h"
+
+namespace driftlight {
+
+/// A state: the numbers of each part of a bidirectional sample apart, so that a subpath that grows
+/// leaves the others as they are.
+struct PrimaryPoint {
+  PrimarySample sensor;  ///< film coordinates first
+  PrimarySample light;
+  PrimarySample connection;
+  PrimarySample strategy;  ///< one number, if only one strategy is used
+  int edges = 0;           ///< length of its paths, if only one strategy is used
+
+  /// A point drawn at random, as sample `index` of a purpose.
+  PrimaryPoint(const PrimaryOptions& options, std::uint64_t seed, Stream purpose,
+               std::uint64_t index);
+
+  /// Does something to all of its numbers.
+  template <class Action>
+  void each(const Action& action) {
+    for (PrimarySample* part : {&sensor, &light, &connection, &strategy}) action(*part);
+  }
+};
+
+/// Light at a film point.
+struct PrimarySplat {
+  Vec2d film;
+  Rgbd color;        ///< of luminance 1
+  double luminance;  ///< positive and finite
+};
+
+/// I = sum of the luminances of what a bidirectional sample finds, as a function of its numbers.
+/// Its integral over them is that of the path contribution over the film.
+class PrimaryTarget {
+ public:
+  /// Strategies that a sample tries: all of them, and its lengths are those from `min_edges` to
+  /// `max_edges` (Kelemen et al. 2002, with bidirectional path tracing); or one of the n + 1 of the
+  /// point's length n, times n + 1 (Hachisuka et al. 2014).
+  enum class Strategies { All, One };
+
+  /// The guide must outlive it. Copies share nothing but references.
+  PrimaryTarget(const Scene& scene, const EmissionGuide& unguided, Strategies strategies,
+                int min_edges, int max_edges);
+
+  /// I; what the point puts on the film, in place of what `splats` held. A value that is not finite
+  /// is no light.
+  double operator()(PrimaryPoint& point, std::vector<PrimarySplat>& splats);
+
+ private:
+  BidirectionalTracer tracer_;
+  Strategies strategies_;
+  int min_edges_;
+};
+
+}  // namespace driftlight
