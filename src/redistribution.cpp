@@ -5,6 +5,7 @@
 #include <cmath>
 #include <mutex>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "driftlight/error.h"
@@ -74,6 +75,19 @@ struct Redistribution {
   void set_deposit(double samples) {
     const double mean = remainders.value() / samples;
     deposit = std::max(kLeastDeposit, mean / options.redistribution.mutations_per_sample);
+  }
+
+  /// Of the films, in the mean of so many passes.
+  double unit_of(double passes) const { return unit / std::max(1.0, passes); }
+  Image by_chains(double passes) const { return film.develop(unit_of(passes)); }
+  Image by_particles(double passes) const { return split_film.develop(unit_of(passes)); }
+  /// The image of the samples with what chains and particles have brought in so many passes.
+  Image complete(Image image, double passes) const {
+    const Image chains = by_chains(passes);
+    const Image particles = by_particles(passes);
+    for (std::size_t i = 0; i < image.rgb.size(); ++i)
+      image.rgb[i] += chains.rgb[i] + particles.rgb[i];
+    return image;
   }
 
   void count(const ChainFigures& figures) {
@@ -233,34 +247,29 @@ class RedistributionSampler {
 
 LangevinResult render_redistribution(const Scene& scene, const LangevinOptions& options,
                                      const RenderOptions& render, double samples_per_pixel) {
-  const Stopwatch watch;
+  RenderClock clock(render);
   Redistribution common(scene, options, render);
-  const double pilot_seconds = watch.seconds();
-  RenderOptions after_pilot = render;
-  if (render.time) after_pilot.time = std::max(1e-3, *render.time - pilot_seconds);
+  const double pilot_seconds = clock.seconds();
   SampleFilm film(scene.camera(), render.seed, 0);
   const RedistributionSampler sampler(common);
-  const PathResult samples =
-      run_passes(after_pilot, static_cast<int>(samples_per_pixel), [&](std::uint64_t index) {
+  PathResult samples = run_passes(
+      render, clock, static_cast<int>(samples_per_pixel),
+      [&](std::uint64_t index) {
         if (common.probed) common.probed->begin_pass(index);
         film.pass(index, sampler);
         common.set_deposit(static_cast<double>(index + 1) * scene.camera().pixel_count());
-      });
+      },
+      [&](double passes) { return common.complete(film.image(passes), passes); });
 
   LangevinResult result;
   result.statistics = common.statistics();
   if (common.probed) result.gradient_check = common.probed->table();
-  result.image = film.image(samples.samples_per_pixel);
-  const double unit = common.unit / std::max(1.0, samples.samples_per_pixel);
-  const Image chains = common.film.develop(unit);
-  const Image particles = common.split_film.develop(unit);
-  for (std::size_t i = 0; i < chains.rgb.size(); ++i)
-    result.image.rgb[i] += chains.rgb[i] + particles.rgb[i];
+  result.image = std::move(samples.image);
   result.statistics.b = mean_luminance(result.image);
   if (!(result.statistics.b > 0.0) && !samples.stopped)
     throw InputError("no path from the sensor to an emitter carries light");
-  result.statistics.remainder = mean_luminance(chains);
-  result.statistics.split = mean_luminance(particles);
+  result.statistics.remainder = mean_luminance(common.by_chains(samples.samples_per_pixel));
+  result.statistics.split = mean_luminance(common.by_particles(samples.samples_per_pixel));
   result.statistics.samples_per_pixel = samples.samples_per_pixel;
   result.statistics.stopped = samples.stopped;
   result.statistics.bootstrap_seconds = pilot_seconds;

@@ -16,6 +16,7 @@
 #include "driftlight/film.h"
 #include "path_tracer.h"
 #include "redistribution.h"
+#include "render_clock.h"
 #include "stopwatch.h"
 
 namespace driftlight {
@@ -81,12 +82,14 @@ class DirectPass {
   /// Mean luminance so far.
   double mean() const { return mean_luminance(sums_.image(passes_)); }
   /// Adds what it has rendered.
-  void finish(LangevinResult& result) const {
+  void add_to(Image& image) const {
     const Image own = sums_.image(passes_);
-    for (std::size_t i = 0; i < own.rgb.size(); ++i) result.image.rgb[i] += own.rgb[i];
-    result.statistics.direct_mean = mean();
-    result.statistics.direct_samples_per_pixel = static_cast<double>(passes_);
-    result.statistics.direct_seconds = seconds_;
+    for (std::size_t i = 0; i < own.rgb.size(); ++i) image.rgb[i] += own.rgb[i];
+  }
+  void report(LangevinStatistics& statistics) const {
+    statistics.direct_mean = mean();
+    statistics.direct_samples_per_pixel = static_cast<double>(passes_);
+    statistics.direct_seconds = seconds_;
   }
   std::uint64_t passes() const { return passes_; }
   double seconds() const { return seconds_; }
@@ -103,10 +106,13 @@ class DirectPass {
 class Runner {
  public:
   Runner(std::vector<std::unique_ptr<Chain>>& chains, DirectPass* direct,
-         const RenderOptions& render, double mutations_per_pixel, double pixels)
+         const RenderOptions& render, RenderClock& clock, double mutations_per_pixel, double pixels)
       : chains_(chains),
         direct_(direct),
         render_(render),
+        clock_(clock),
+        pixels_(pixels),
+        start_(clock.seconds()),
         mutations_(static_cast<std::uint64_t>(
             std::ceil(std::max(1.0, mutations_per_pixel * pixels /
                                         std::max(1.0, static_cast<double>(chains.size())))))),
@@ -114,15 +120,19 @@ class Runner {
                                         std::max(1.0, direct->ratio() * mutations_per_pixel)))
                                   : 0) {}
 
-  /// True if it was stopped early.
-  bool run() {
+  /// True if it was stopped early. `develop()` is the image so far.
+  template <class Develop>
+  bool run(const Develop& develop) {
     while (true) {
       if (render_.stop != nullptr && render_.stop->load()) return true;
-      const double elapsed = watch_.seconds();
+      const double elapsed = clock_.seconds();
       const double fraction = render_.time ? elapsed / *render_.time : work_done();
       if (render_.progress) render_.progress({std::min(fraction, 1.0), elapsed});
-      if (fraction >= 1.0) return false;
-      if (direct_is_due(elapsed))
+      if (chains_.empty() || done_ > 0) {
+        clock_.reach(fraction, mutations_per_pixel(), develop);
+        if (fraction >= 1.0) return false;
+      }
+      if (direct_is_due(elapsed - start_))
         direct_->pass();
       else
         round(elapsed);
@@ -137,6 +147,10 @@ class Runner {
     return std::min(chains, static_cast<double>(direct_->passes()) / static_cast<double>(passes_));
   }
 
+  double mutations_per_pixel() const {
+    return static_cast<double>(done_) * static_cast<double>(chains_.size()) / pixels_;
+  }
+
   bool direct_is_due(double elapsed) const {
     if (direct_ == nullptr) return false;
     if (chains_.empty()) return true;
@@ -147,11 +161,17 @@ class Runner {
   void round(double elapsed) {
     const Stopwatch watch;
     std::uint64_t mutations = next_round(elapsed);
-    if (!render_.time) mutations = std::min(mutations, mutations_ - done_);
+    if (!render_.time) mutations = std::min(mutations, before_snapshot());
     tbb::parallel_for(std::size_t{0}, chains_.size(),
                       [&](std::size_t i) { chains_[i]->run(mutations); });
     done_ += mutations;
     seconds_ += watch.seconds();
+  }
+
+  /// Mutations up to the next snapshot: where it is taken must not depend on the machine's speed.
+  std::uint64_t before_snapshot() const {
+    const double there = std::ceil(clock_.next_snapshot() * static_cast<double>(mutations_));
+    return std::max(done_ + 1, static_cast<std::uint64_t>(there)) - done_;
   }
 
   /// Mutations that take about a tenth of a second, or what is left of the time.
@@ -167,18 +187,20 @@ class Runner {
   std::vector<std::unique_ptr<Chain>>& chains_;
   DirectPass* direct_;
   const RenderOptions& render_;
+  RenderClock& clock_;
+  double pixels_;
+  double start_;             ///< on the clock
   std::uint64_t mutations_;  ///< of each chain, if no time is given
   std::uint64_t passes_;     ///< of direct light, if no time is given
   std::uint64_t done_ = 0;
   double seconds_ = 0;
-  Stopwatch watch_;
 };
 
 /// The chains with what they are started from.
 struct Chains {
   LangevinOptions options;
   std::optional<PathSampler> sampler;
-  RunningMean weights;  ///< f / q of the bootstrap
+  RunningMean bootstrap_weights;  ///< f / q
   std::vector<std::unique_ptr<Chain>> all;
   std::vector<GradientProbe> probes;  ///< of each, if gradients are checked
 
@@ -189,8 +211,8 @@ struct Chains {
     if (min_depth > options.max_depth) return;
     sampler.emplace(scene, options.max_depth, options.large_steps, min_depth, options.phase_space);
     const Bootstrap bootstrap(*sampler, scene, options.bootstrap, render.seed);
-    weights = bootstrap.weights();
-    if (!(weights.sum > 0.0)) return;
+    bootstrap_weights = bootstrap.weights();
+    if (!(bootstrap_weights.sum > 0.0)) return;
     if (!options.large_step_probability)
       options.large_step_probability = std::clamp(bootstrap.effective_fraction(), 0.1, 0.9);
     for (const PathSampler::Sample& start : bootstrap.resample(options.chains)) {
@@ -211,11 +233,15 @@ struct Chains {
     return table;
   }
 
+  /// Deposits all that the chains have gathered.
+  void flush() {
+    for (const auto& chain : all) chain->flush();
+  }
   /// Statistics in the order of the chains: the same for any number of threads.
-  LangevinStatistics finish() {
+  LangevinStatistics statistics() const {
     LangevinStatistics sum;
+    RunningMean weights = bootstrap_weights;
     for (const auto& chain : all) {
-      chain->flush();
       sum += chain->statistics();
       weights += chain->weights();
     }
@@ -229,32 +255,40 @@ struct Chains {
 LangevinResult run_langevin(const Scene& scene, const LangevinOptions& options,
                             const RenderOptions& render, double mutations_per_pixel) {
   const double pixels = scene.camera().pixel_count();
-  Stopwatch watch;
+  RenderClock clock(render);
   const bool apart = options.direct == DirectLight::Apart;
   Film film(scene.camera().film_width, scene.camera().film_height);
   Chains chains(scene, options, render, apart ? kDirectDepth + 1 : 1, film);
-  const double bootstrap_seconds = watch.restart();
+  const double bootstrap_seconds = clock.seconds();
   std::optional<DirectPass> direct;
   if (apart) {
     direct.emplace(scene, options.max_depth, render.seed);
     direct->pass();
-    direct->set_share(chains.weights.mean());
+    direct->set_share(chains.bootstrap_weights.mean());
   }
   if (chains.all.empty() && !(direct && direct->mean() > 0.0))
     throw InputError("no path from the sensor to an emitter carries light");
+  const auto develop = [&] {
+    chains.flush();
+    const LangevinStatistics so_far = chains.statistics();
+    const double count = std::max(1.0, static_cast<double>(so_far.mutations));
+    Image image = film.develop(so_far.b * pixels / count);
+    if (direct) direct->add_to(image);
+    return image;
+  };
   const bool stopped =
-      Runner(chains.all, direct ? &*direct : nullptr, render, mutations_per_pixel, pixels).run();
+      Runner(chains.all, direct ? &*direct : nullptr, render, clock, mutations_per_pixel, pixels)
+          .run(develop);
 
   LangevinResult result;
+  result.image = develop();
   LangevinStatistics& statistics = result.statistics;
-  statistics = chains.finish();
+  statistics = chains.statistics();
   if (render.check_gradients) result.gradient_check = chains.gradient_check();
   statistics.stopped = stopped;
   statistics.bootstrap_seconds = bootstrap_seconds;
-  statistics.render_seconds = watch.seconds();
-  const double count = std::max(1.0, static_cast<double>(statistics.mutations));
-  result.image = film.develop(statistics.b * pixels / count);
-  if (direct) direct->finish(result);
+  statistics.render_seconds = clock.seconds() - bootstrap_seconds;
+  if (direct) direct->report(statistics);
   return result;
 }
 
