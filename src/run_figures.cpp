@@ -82,9 +82,9 @@ TileTest test_tiles(const std::vector<Moments>& tiles, const std::vector<double>
 }
 
 Agreement agreement(const std::vector<std::vector<std::vector<double>>>& batches) {
-  const std::size_t parts = batches.front().size();
+  const std::size_t half = batches.front().size() / 2;
   const std::size_t tiles = batches.front().front().size();
-  const auto draws = static_cast<double>(parts / 2);
+  const auto draws = static_cast<double>(half);
   double sum_within = 0;
   double sum_between = 0;
   Agreement result;
@@ -92,8 +92,8 @@ Agreement agreement(const std::vector<std::vector<std::vector<double>>>& batches
     Moments within;
     Moments means;
     for (const auto& run : batches)
-      for (const std::size_t half : {std::size_t{0}, std::size_t{1}}) {
-        const Moments part = half_of(run, half, tile);
+      for (const std::size_t which : {std::size_t{0}, std::size_t{1}}) {
+        const Moments part = half_of(run, which, tile);
         within.add(part.variance());
         means.add(part.mean());
       }

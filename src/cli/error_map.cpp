@@ -82,8 +82,9 @@ Image error_map(const std::vector<double>& errors, int width) {
 }
 
 Image error_scale(int width) {
-  std::vector<double> positions;
-  for (int i = 0; i < width; ++i) positions.push_back((i + 0.5) / width);
+  std::vector<double> positions(static_cast<std::size_t>(width));
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    positions[i] = (static_cast<double>(i) + 0.5) / width;
   return picture(positions, width);
 }
 
