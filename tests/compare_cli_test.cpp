@@ -287,6 +287,32 @@ TEST_F(CompareCli, CountsTheFamiliesOfSplitting) {
   EXPECT_GT(results().at("integrators")[0].at("effective_families").get<double>(), 1.0);
 }
 
+TEST_F(CompareCli, StudiesTheTermsOfTheStep) {
+  render_reference();
+  const Outcome outcome = compare({"--study", "terms", "--reference", "reference.exr", "--time",
+                                   "0.05", "--mutations-per-pixel", "4", "--runs", "2"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(files("out"), (std::set<std::string>{"equal_mutations", "equal_time", "terms.csv"}));
+  std::set<std::string> kinds;
+  for (const char* budget : {"out/equal_time", "out/equal_mutations"}) {
+    EXPECT_EQ(files(budget).count("report.html"), 1U);
+    const json all = results(budget);
+    ASSERT_EQ(all.at("integrators").size(), 12U);
+    for (const json& integrator : all.at("integrators")) {
+      EXPECT_TRUE(contains(outcome.out, integrator.at("name"))) << outcome.out;
+      const json& options = integrator.at("options");
+      EXPECT_EQ(options.at("mode"), "chain");
+      kinds.insert(options.at("preconditioner").dump() + options.at("drift").dump() +
+                   options.at("safety").dump() + options.at("time_step_cap").dump());
+    }
+  }
+  EXPECT_EQ(kinds.size(), 12U);
+  for (const json& integrator : results("out/equal_mutations").at("integrators"))
+    EXPECT_NEAR(integrator.at("moments").back().at("work").get<double>(), 4.0, 0.4);
+  const std::string csv = read("out/terms.csv");
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 13);
+}
+
 // --- Mistakes ------------------------------------------------------------------------------------
 
 struct Mistake {
@@ -300,7 +326,10 @@ TEST_F(CompareCli, MistakesAreNamedBeforeAnythingIsRendered) {
   std::filesystem::create_directory(folder() / "full");
   std::ofstream(folder() / "full/results.json") << "old results";
   const std::vector<Mistake> mistakes{
-      {{}, {"--integrators"}},
+      {{}, {"--integrators", "--study"}},
+      {{"--study", "terms", "--integrators", "path"}, {"either", "--integrators", "--study"}},
+      {{"--study", "colours"}, {"'colours'", "terms"}},
+      {{"--study", "terms", "--spp", "4"}, {"--study", "--spp"}},
       {{"--integrators", "photons"}, {"'photons'", "langevin", "path", "bdpt", "light"}},
       {{"--integrators", "path,"}, {"unknown integrator ''"}},
       {{"--integrators", "path,bdpt,path"}, {"'path'", "twice"}},

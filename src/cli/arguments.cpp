@@ -14,6 +14,7 @@
 #include <system_error>
 #include <type_traits>
 
+#include "cli/terms_study.h"
 #include "driftlight/path.h"
 
 namespace driftlight::cli {
@@ -77,6 +78,7 @@ struct Raw {
   std::string reference;
   bool json = false;
   std::string choices;
+  std::string study;
   std::string runs = "3";
   std::string folder;
 };
@@ -133,8 +135,11 @@ void declare_compare(CLI::App& app, Raw& raw) {
   app.add_option("--integrators", raw.choices,
                  "what to compare, separated by commas: integrators as `render` takes them, each "
                  "with options if need be, as in bdpt,langevin:mode=chain:scale=0.2")
-      ->required()
       ->type_name("NAME[:OPTION=VALUE]..,..");
+  app.add_option("--study", raw.study,
+                 "terms: instead of --integrators, langevin with mode=chain and each "
+                 "preconditioner, drift and time-step rule, at equal time and at equal mutations")
+      ->type_name("STUDY");
   app.add_option("--reference", raw.reference,
                  "image to measure errors against; without it they follow from the spread between "
                  "runs alone")
@@ -149,7 +154,8 @@ void declare_compare(CLI::App& app, Raw& raw) {
                  "instead of a time, the same work: samples per pixel")
       ->type_name("N");
   app.add_option("--mutations-per-pixel", raw.mutations_per_pixel,
-                 "likewise, of langevin with mode=chain; may stand beside --spp")
+                 "likewise, of langevin with mode=chain; may stand beside --spp, with --study "
+                 "beside --time (default there: 100)")
       ->type_name("N");
   app.add_option("--runs", raw.runs, "independent runs of each, at least 2")
       ->type_name("N")
@@ -292,31 +298,56 @@ std::vector<std::string> split(const std::string& text, char separator) {
 /// "langevin:mode=chain:scale=0.2"
 IntegratorChoice parse_choice(const std::string& text) {
   const std::vector<std::string> parts = split(text, ':');
-  IntegratorChoice choice{.text = text, .integrator = parse_integrator(parts[0]), .settings = {}};
+  IntegratorChoice choice{.name = text, .integrator = parse_integrator(parts[0]), .settings = {}};
   for (std::size_t i = 1; i < parts.size(); ++i)
     choice.settings.push_back(
         split_setting(fmt::format("the setting of {} in --integrators", parts[0]), parts[i]));
   return choice;
 }
 
+constexpr double kCompareSeconds = 10;
+constexpr double kStudyMutations = 100;
+
+/// Its integrators, at equal time and at equal mutations.
+void set_study(const Raw& raw, CompareCommand& command) {
+  if (raw.study != "terms")
+    throw UsageError(fmt::format("unknown study '{}'; the study is terms", raw.study));
+  if (raw.samples_per_pixel)
+    throw UsageError("--study takes --time and --mutations-per-pixel, not --spp");
+  const Work given = parse_work(raw);
+  Work equal_time;
+  equal_time.time = given.time.value_or(kCompareSeconds);
+  Work equal_mutations;
+  equal_mutations.mutations_per_pixel = given.mutations_per_pixel.value_or(kStudyMutations);
+  command.integrators = terms_of_the_step();
+  command.budgets = {{"equal_time", equal_time}, {"equal_mutations", equal_mutations}};
+}
+
 CompareCommand compare_command(const Raw& raw) {
   CompareCommand command;
   command.scene = scene_arguments(raw);
   if (!raw.reference.empty()) command.reference = raw.reference;
-  for (const std::string& text : split(raw.choices, ',')) {
-    for (const IntegratorChoice& other : command.integrators)
-      if (other.text == text) throw UsageError(fmt::format("--integrators names '{}' twice", text));
-    command.integrators.push_back(parse_choice(text));
-  }
-  command.work = parse_work(raw);
-  const bool by_work = command.work.mutations_per_pixel || command.work.samples_per_pixel;
-  if (by_work && command.work.time)
-    throw UsageError("give either --time, or --spp and --mutations-per-pixel");
-  if (!by_work && !command.work.time) command.work.time = 10;
   command.runs = parse_number("--runs", raw.runs, 2);
   command.threads = parse_number("--threads", raw.threads, 0);
   command.seed = parse_number("--seed", raw.seed, std::uint64_t{0});
   command.folder = raw.folder;
+  if (raw.choices.empty() == raw.study.empty())
+    throw UsageError("give either --integrators or --study");
+  if (!raw.study.empty()) {
+    set_study(raw, command);
+    return command;
+  }
+  for (const std::string& text : split(raw.choices, ',')) {
+    for (const IntegratorChoice& other : command.integrators)
+      if (other.name == text) throw UsageError(fmt::format("--integrators names '{}' twice", text));
+    command.integrators.push_back(parse_choice(text));
+  }
+  Work work = parse_work(raw);
+  const bool by_work = work.mutations_per_pixel || work.samples_per_pixel;
+  if (by_work && work.time)
+    throw UsageError("give either --time, or --spp and --mutations-per-pixel");
+  if (!by_work && !work.time) work.time = kCompareSeconds;
+  command.budgets = {{"", work}};
   return command;
 }
 

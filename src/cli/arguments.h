@@ -60,17 +60,24 @@ struct RenderCommand {
 
 /// An integrator with settings, as `compare` takes it: NAME[:OPTION=VALUE]...
 struct IntegratorChoice {
-  std::string text;  ///< as it was written
+  std::string name;  ///< as it was written, or for a study made up
   Integrator integrator = Integrator::Langevin;
   Settings settings;
+};
+
+/// What all runs of a comparison are given.
+struct Budget {
+  std::string folder;  ///< of its results, within that of the command; empty: that one itself
+  Work work;
 };
 
 /// driftlight compare
 struct CompareCommand {
   SceneArguments scene;
   std::optional<std::filesystem::path> reference;
-  std::vector<IntegratorChoice> integrators;  ///< at least one, no two of the same text
-  Work work;
+  std::vector<IntegratorChoice> integrators;  ///< at least one, no two of the same name
+  /// One; of the study of terms two, equal time and equal mutations.
+  std::vector<Budget> budgets;
   int runs = 3;  ///< of each integrator, at least two
   int threads = 0;
   std::uint64_t seed = 0;

@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cli/commands.h"
@@ -17,6 +18,7 @@
 #include "cli/interrupt.h"
 #include "cli/print.h"
 #include "cli/progress_bar.h"
+#include "cli/terms_study.h"
 #include "cli/text_file.h"
 #include "driftlight/error.h"
 #include "driftlight/image.h"
@@ -44,15 +46,19 @@ std::optional<Image> read_reference(const CompareCommand& command,
   return image;
 }
 
-LoadedScene load(const CompareCommand& command, std::vector<Contender>& contenders) {
+LoadedScene load(const CompareCommand& command) {
   LoadedScene loaded = load_scene(command.scene.file, {.defines = command.scene.defines});
   for (const std::string& notice : loaded.notices) print_notice(notice);
+  return loaded;
+}
+
+/// Says each notice once.
+void take_depths(const LoadedScene& loaded, std::vector<Contender>& contenders) {
   std::set<std::string> notices;
   for (Contender& contender : contenders)
     notices.insert(take_depth(loaded, contender.choice.settings, contender.options));
   for (const std::string& notice : notices)
     if (!notice.empty()) print_notice(notice);
-  return loaded;
 }
 
 /// A power of two that brings the median of what is lit near middle grey.
@@ -77,7 +83,7 @@ PagePicture write_pictures(const std::filesystem::path& folder, const Contender&
                            const std::optional<Image>& reference, double exposure) {
   const std::string stem = file_stem(contender.choice);
   const Image& image = contender.final_image(0);
-  PagePicture picture{contender.choice.text, folder / (stem + ".png"),
+  PagePicture picture{contender.choice.name, folder / (stem + ".png"),
                       folder / (stem + "_error.png")};
   write_image(folder / (stem + ".exr"), image, contender.runs.front().metadata);
   write_exposed(picture.image, image, exposure);
@@ -105,32 +111,64 @@ void write_all(const std::filesystem::path& folder, const std::vector<Contender>
   write_text(folder / "report.html", page_text(results, pictures, scale));
 }
 
-}  // namespace
+struct Compared {
+  std::vector<Contender> contenders;
+  nlohmann::ordered_json results;
+};
 
-void run(const CompareCommand& command) {
-  std::vector<Contender> contenders = contenders_of(command);
-  check_folder_target(command.folder);
-  const LoadedScene loaded = load(command, contenders);
-  const std::optional<Image> reference = read_reference(command, loaded.scene.camera());
-  if (!reference)
-    print_notice(
-        "there is no reference: errors follow from the spread between runs, which shows no bias");
+/// Renders all runs with one budget.
+Compared compare(const LoadedScene& loaded, const CompareCommand& command, const Work& work,
+                 const std::optional<Image>& reference) {
+  std::vector<Contender> contenders = contenders_of(command.integrators, work);
+  take_depths(loaded, contenders);
   {
     ProgressBar bar(true);
     render_runs(
-        loaded.scene, command, stop_on_interrupt(),
+        loaded.scene, command, work, stop_on_interrupt(),
         [&](const Progress& progress) { bar.update(progress); }, contenders);
   }
   const std::size_t complete = contenders.front().runs.size();
   if (complete < static_cast<std::size_t>(command.runs))
     print_notice(fmt::format("stopped early: {} of {} runs of each", complete, command.runs));
+  nlohmann::ordered_json results = comparison_results(command, work, contenders, reference);
+  return {std::move(contenders), std::move(results)};
+}
 
-  nlohmann::ordered_json results = comparison_results(command, contenders, reference);
-  PendingFolder pending(command.folder);
-  write_all(pending.temporary(), contenders, reference, results);
-  pending.commit();
-  print(summary_text(results));
-  print(fmt::format("wrote {}\n", (command.folder / "report.html").string()));
+/// What the terminal shows; the table of a study also goes into its folder.
+std::string summarize(const std::vector<nlohmann::ordered_json>& results,
+                      const std::filesystem::path& folder) {
+  if (results.size() == 1) return summary_text(results.front());
+  write_text(folder / "terms.csv", terms_csv(results[0], results[1]));
+  return terms_table(results[0], results[1]);
+}
+
+}  // namespace
+
+void run(const CompareCommand& command) {
+  for (const Budget& budget : command.budgets) contenders_of(command.integrators, budget.work);
+  check_folder_target(command.folder);
+  const LoadedScene loaded = load(command);
+  const std::optional<Image> reference = read_reference(command, loaded.scene.camera());
+  if (!reference)
+    print_notice(
+        "there is no reference: errors follow from the spread between runs, which shows no bias");
+
+  // Made when there is something to put into it.
+  std::optional<PendingFolder> pending;
+  std::vector<nlohmann::ordered_json> results;
+  std::string written;
+  for (const Budget& budget : command.budgets) {
+    Compared compared = compare(loaded, command, budget.work, reference);
+    if (!pending) pending.emplace(command.folder);
+    const std::filesystem::path folder = pending->temporary() / budget.folder;
+    std::filesystem::create_directories(folder);
+    write_all(folder, compared.contenders, reference, compared.results);
+    results.push_back(std::move(compared.results));
+    written += fmt::format("wrote {}\n", (command.folder / budget.folder / "report.html").string());
+  }
+  const std::string summary = summarize(results, pending->temporary());
+  pending->commit();
+  print(summary + written);
 }
 
 }  // namespace driftlight::cli

@@ -65,12 +65,12 @@ class RunRecorder {
   double work_ = 0;
 };
 
-RenderOptions options_of_run(const CompareCommand& command, const std::atomic<bool>& stop,
-                             std::uint64_t seed) {
+RenderOptions options_of_run(const CompareCommand& command, const Work& work,
+                             const std::atomic<bool>& stop, std::uint64_t seed) {
   RenderOptions how;
   how.threads = command.threads;
   how.seed = seed;
-  how.time = command.work.time;
+  how.time = work.time;
   how.stop = &stop;
   return how;
 }
@@ -97,18 +97,19 @@ void check_work(const Contender& contender, const Work& work) {
   const bool given =
       mutations ? work.mutations_per_pixel.has_value() : work.samples_per_pixel.has_value();
   if (!given)
-    throw UsageError(fmt::format("{} takes {}, or all take --time", contender.choice.text,
+    throw UsageError(fmt::format("{} takes {}, or all take --time", contender.choice.name,
                                  mutations ? "--mutations-per-pixel" : "--spp"));
 }
 
 }  // namespace
 
-std::vector<Contender> contenders_of(const CompareCommand& command) {
+std::vector<Contender> contenders_of(const std::vector<IntegratorChoice>& choices,
+                                     const Work& work) {
   std::vector<Contender> contenders;
-  for (const IntegratorChoice& choice : command.integrators) {
+  for (const IntegratorChoice& choice : choices) {
     Contender contender{choice, options_of(choice.integrator), {}};
     apply(choice.settings, contender.options);
-    check_work(contender, command.work);
+    check_work(contender, work);
     contenders.push_back(std::move(contender));
   }
   const auto uses = [&](bool mutations) {
@@ -116,9 +117,9 @@ std::vector<Contender> contenders_of(const CompareCommand& command) {
       return counts_mutations(contender.options) == mutations;
     });
   };
-  if (command.work.mutations_per_pixel && !uses(true))
+  if (work.mutations_per_pixel && !uses(true))
     throw UsageError("--mutations-per-pixel: none of the integrators is langevin with mode=chain");
-  if (command.work.samples_per_pixel && !uses(false))
+  if (work.samples_per_pixel && !uses(false))
     throw UsageError("--spp: all of the integrators take --mutations-per-pixel");
   return contenders;
 }
@@ -132,21 +133,22 @@ std::vector<double> moments_of(const Work& work) {
   return moments;
 }
 
-void render_runs(const Scene& scene, const CompareCommand& command, const std::atomic<bool>& stop,
+void render_runs(const Scene& scene, const CompareCommand& command, const Work& work,
+                 const std::atomic<bool>& stop,
                  const std::function<void(const Progress&)>& progress,
                  std::vector<Contender>& contenders) {
   const Stopwatch watch;
-  const std::vector<double> moments = moments_of(command.work);
+  const std::vector<double> moments = moments_of(work);
   const auto rounds = static_cast<std::size_t>(command.runs);
   const double total = static_cast<double>(rounds * contenders.size());
   std::size_t done = 0;
   const auto round_is_complete = [&] {
     for (Contender& contender : contenders) {
-      RenderOptions how = options_of_run(command, stop, command.seed + done);
+      RenderOptions how = options_of_run(command, work, stop, command.seed + done);
       how.progress = [&](const Progress& of_run) {
         progress({(static_cast<double>(done) + of_run.fraction) / total, watch.seconds()});
       };
-      if (stop.load() || !render_run(scene, command.work, moments, how, contender)) return false;
+      if (stop.load() || !render_run(scene, work, moments, how, contender)) return false;
       ++done;
     }
     return true;

@@ -42,16 +42,18 @@ struct Contender {
   const Image& final_image(std::size_t run) const { return runs[run].snapshots.back().image; }
 };
 
-/// Settings applied, before anything is rendered. Throws OptionError; UsageError if the command has
-/// no work for one of them.
-std::vector<Contender> contenders_of(const CompareCommand& command);
+/// Settings applied, before anything is rendered. Throws OptionError; UsageError unless the work is
+/// just that which they have a use for.
+std::vector<Contender> contenders_of(const std::vector<IntegratorChoice>& choices,
+                                     const Work& work);
 
 /// Fractions of the budget, rising: 1, 1/2, 1/4, .. to about a second, to 1/8 at least.
 std::vector<double> moments_of(const Work& work);
 
-/// Renders all runs. If `stop` turns true, the runs of the round under way are dropped; throws
-/// RuntimeError if fewer than two rounds are complete.
-void render_runs(const Scene& scene, const CompareCommand& command, const std::atomic<bool>& stop,
+/// Renders all runs of the command. If `stop` turns true, the runs of the round under way are
+/// dropped; throws RuntimeError if fewer than two rounds are complete.
+void render_runs(const Scene& scene, const CompareCommand& command, const Work& work,
+                 const std::atomic<bool>& stop,
                  const std::function<void(const Progress&)>& progress,
                  std::vector<Contender>& contenders);
 

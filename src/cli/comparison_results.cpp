@@ -29,6 +29,7 @@ std::vector<const Snapshot*> snapshots_at(const Contender& contender, double fra
 template <class Range, class Figure>
 double median_of(const Range& range, const Figure& figure) {
   std::vector<double> values;
+  values.reserve(range.size());
   for (const auto& x : range) values.push_back(figure(x));
   return median(std::move(values));
 }
@@ -111,6 +112,7 @@ std::vector<Moments> tiles_over_runs(const Contender& contender) {
 
 std::vector<double> means_of(const std::vector<Moments>& tiles) {
   std::vector<double> means;
+  means.reserve(tiles.size());
   for (const Moments& tile : tiles) means.push_back(tile.mean());
   return means;
 }
@@ -177,8 +179,9 @@ Json contender_json(const Contender& contender, const std::vector<double>& momen
                     {"seconds", run.snapshots.back().seconds},
                     {"work", run.snapshots.back().work},
                     {"statistics", run.statistics}});
-  return {{"name", contender.choice.text},
+  return {{"name", contender.choice.name},
           {"integrator", name_of(contender.choice.integrator)},
+          {"settings", contender.choice.settings},
           {"options", contender.runs.front().statistics["options"]},
           {"work_in",
            counts_mutations(contender.options) ? "mutations per pixel" : "samples per pixel"},
@@ -208,19 +211,18 @@ std::string cell(const Json& object, const char* name) {
 
 }  // namespace
 
-nlohmann::ordered_json comparison_results(const CompareCommand& command,
+nlohmann::ordered_json comparison_results(const CompareCommand& command, const Work& work,
                                           const std::vector<Contender>& contenders,
                                           const std::optional<Image>& reference) {
   const Image& first = contenders.front().final_image(0);
-  const std::vector<double> moments = moments_of(command.work);
+  const std::vector<double> moments = moments_of(work);
   Json all = Json::array();
   for (const Contender& contender : contenders)
     all.push_back(contender_json(contender, moments, reference));
   Json budget = Json::object();
-  if (command.work.time) budget["seconds"] = *command.work.time;
-  if (command.work.samples_per_pixel) budget["samples_per_pixel"] = *command.work.samples_per_pixel;
-  if (command.work.mutations_per_pixel)
-    budget["mutations_per_pixel"] = *command.work.mutations_per_pixel;
+  if (work.time) budget["seconds"] = *work.time;
+  if (work.samples_per_pixel) budget["samples_per_pixel"] = *work.samples_per_pixel;
+  if (work.mutations_per_pixel) budget["mutations_per_pixel"] = *work.mutations_per_pixel;
   return {{"driftlight", DRIFTLIGHT_VERSION},
           {"scene", {{"file", command.scene.file.string()}, {"defines", command.scene.defines}}},
           {"image", {{"width", first.width}, {"height", first.height}}},
@@ -271,7 +273,7 @@ std::string summary_text(const nlohmann::ordered_json& results) {
 }
 
 std::string file_stem(const IntegratorChoice& choice) {
-  std::string stem = choice.text;
+  std::string stem = choice.name;
   std::replace(stem.begin(), stem.end(), ':', '_');
   return stem;
 }

@@ -14,7 +14,7 @@ namespace driftlight::cli {
 
 /// All of results.json. Of several runs of one moment it gives medians, of spreads those over all
 /// pairs of runs. What there is no reference, or no kernel, for is null.
-nlohmann::ordered_json comparison_results(const CompareCommand& command,
+nlohmann::ordered_json comparison_results(const CompareCommand& command, const Work& work,
                                           const std::vector<Contender>& contenders,
                                           const std::optional<Image>& reference);
 
