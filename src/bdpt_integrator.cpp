@@ -61,6 +61,7 @@ class BdptSampler {
 PathResult render_bdpt(const Scene& scene, const BdptOptions& options, const RenderOptions& render,
                        int samples_per_pixel) {
   options.validate();
+  RenderClock clock(render);
   const EmissionGuide unguided(scene);
   const BdptSampler sampler(scene, unguided, options);
   std::vector<std::string> names;
@@ -68,10 +69,10 @@ PathResult render_bdpt(const Scene& scene, const BdptOptions& options, const Ren
   SampleFilm film(scene.camera(), render.seed, static_cast<int>(names.size()));
   tbb::task_arena arena(render.threads > 0 ? render.threads : tbb::task_arena::automatic);
   PathResult result = arena.execute([&] {
-    return run_passes(render, samples_per_pixel,
-                      [&](std::uint64_t index) { film.pass(index, sampler); });
+    return run_passes(
+        render, clock, samples_per_pixel, [&](std::uint64_t index) { film.pass(index, sampler); },
+        [&](double passes) { return film.image(passes); });
   });
-  result.image = film.image(result.samples_per_pixel);
   result.non_finite = film.non_finite();
   if (render.strategies != nullptr)
     *render.strategies = film.layers(names, result.samples_per_pixel);

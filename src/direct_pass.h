@@ -36,12 +36,14 @@ class DirectPass {
   /// Mean luminance so far.
   double mean() const { return mean_luminance(sums_.image(passes_)); }
   /// Adds what it has rendered.
-  void finish(LangevinResult& result) const {
+  void add_to(Image& image) const {
     const Image own = sums_.image(passes_);
-    for (std::size_t i = 0; i < own.rgb.size(); ++i) result.image.rgb[i] += own.rgb[i];
-    result.statistics.direct_mean = mean();
-    result.statistics.direct_samples_per_pixel = static_cast<double>(passes_);
-    result.statistics.direct_seconds = seconds_;
+    for (std::size_t i = 0; i < own.rgb.size(); ++i) image.rgb[i] += own.rgb[i];
+  }
+  void report(LangevinStatistics& statistics) const {
+    statistics.direct_mean = mean();
+    statistics.direct_samples_per_pixel = static_cast<double>(passes_);
+    statistics.direct_seconds = seconds_;
   }
   std::uint64_t passes() const { return passes_; }
   double seconds() const { return seconds_; }

@@ -55,15 +55,16 @@ class LightTracer {
 PathResult render_light(const Scene& scene, const LightOptions& options,
                         const RenderOptions& render, int samples_per_pixel) {
   options.validate();
+  RenderClock clock(render);
   const EmissionGuide unguided(scene);
   const LightTracer tracer(scene, unguided, options.max_depth);
   SampleFilm film(scene.camera(), render.seed, 0);
   tbb::task_arena arena(render.threads > 0 ? render.threads : tbb::task_arena::automatic);
   PathResult result = arena.execute([&] {
-    return run_passes(render, samples_per_pixel,
-                      [&](std::uint64_t index) { film.pass(index, tracer); });
+    return run_passes(
+        render, clock, samples_per_pixel, [&](std::uint64_t index) { film.pass(index, tracer); },
+        [&](double passes) { return film.image(passes); });
   });
-  result.image = film.image(result.samples_per_pixel);
   result.non_finite = film.non_finite();
   return result;
 }

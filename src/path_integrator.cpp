@@ -11,10 +11,11 @@ namespace {
 
 PathResult run_path(const Scene& scene, const PathOptions& options, const RenderOptions& render,
                     int samples_per_pixel) {
+  RenderClock clock(render);
   PixelSums sums(scene, options.max_depth, render.seed);
-  PathResult result =
-      run_passes(render, samples_per_pixel, [&](std::uint64_t pass) { sums.pass(pass); });
-  result.image = sums.image(static_cast<std::uint64_t>(result.samples_per_pixel));
+  PathResult result = run_passes(
+      render, clock, samples_per_pixel, [&](std::uint64_t pass) { sums.pass(pass); },
+      [&](double passes) { return sums.image(static_cast<std::uint64_t>(passes)); });
   result.non_finite = sums.non_finite();
   return result;
 }

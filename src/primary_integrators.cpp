@@ -4,6 +4,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -33,44 +35,50 @@ class PrimaryChains {
         unguided_(scene),
         target_(scene, unguided_, strategies, min_edges, options.max_depth) {
     if (min_edges > options.max_depth) return;
-    weights_.resize(strategies == Strategies::One
-                        ? static_cast<std::size_t>(options.max_depth - min_edges) + 1
-                        : 1);
+    bootstrap_weights_.resize(strategies == Strategies::One
+                                  ? static_cast<std::size_t>(options.max_depth - min_edges) + 1
+                                  : 1);
     const std::vector<double> values = bootstrap();
-    for (std::size_t i = 0; i < values.size(); ++i) weights_[i % weights_.size()].add(values[i]);
-    if (!(b() > 0.0)) return;
+    for (std::size_t i = 0; i < values.size(); ++i)
+      bootstrap_weights_[i % bootstrap_weights_.size()].add(values[i]);
+    if (!(bootstrap_mean() > 0.0)) return;
     Rng rng(seed, Stream::Resampling, 0);
     for (const std::size_t i : systematic_resampling(values, options.chains, rng.uniform()))
       all.push_back(std::make_unique<PrimaryChain>(target_, options, film, point(i),
                                                    Rng(seed, Stream::Chain, all.size())));
   }
 
+  /// Deposits all that the chains have gathered.
+  void flush() {
+    for (const auto& chain : all) chain->flush();
+  }
   /// Statistics in the order of the chains: the same for any number of threads.
-  LangevinStatistics finish() {
+  LangevinStatistics statistics() const {
     LangevinStatistics sum;
+    std::vector<RunningMean> weights = bootstrap_weights_;
     for (const auto& chain : all) {
-      chain->flush();
       sum += chain->statistics();
-      weights_[length_index(*chain)] += chain->weights();
+      weights[length_index(*chain)] += chain->weights();
     }
     sum.large_step_probability = options_.large_step_probability;
-    sum.b = b();
+    sum.b = integral(weights);
     double variance = 0.0;
-    for (const RunningMean& length : weights_) variance += length.error() * length.error();
+    for (const RunningMean& length : weights) variance += length.error() * length.error();
     sum.b_error = std::sqrt(variance);
     return sum;
   }
 
-  /// The integral of the target, over all lengths.
-  double b() const {
-    double sum = 0.0;
-    for (const RunningMean& length : weights_) sum += length.mean();
-    return sum;
-  }
+  /// Of the target over all lengths, as the bootstrap has found it.
+  double bootstrap_mean() const { return integral(bootstrap_weights_); }
 
   std::vector<std::unique_ptr<PrimaryChain>> all;
 
  private:
+  static double integral(const std::vector<RunningMean>& weights) {
+    double sum = 0.0;
+    for (const RunningMean& length : weights) sum += length.mean();
+    return sum;
+  }
   std::size_t length_index(const PrimaryChain& chain) const {
     return strategies_ == Strategies::One ? static_cast<std::size_t>(chain.edges() - min_edges_)
                                           : 0;
@@ -80,14 +88,14 @@ class PrimaryChains {
   PrimaryPoint point(std::size_t i) const {
     PrimaryPoint result(options_, seed_, Stream::Bootstrap, i);
     if (strategies_ == Strategies::One)
-      result.edges = min_edges_ + static_cast<int>(i % weights_.size());
+      result.edges = min_edges_ + static_cast<int>(i % bootstrap_weights_.size());
     return result;
   }
 
   /// The target at as many samples of each length.
   std::vector<double> bootstrap() const {
     constexpr std::size_t kTask = 256;
-    const std::size_t lengths = weights_.size();
+    const std::size_t lengths = bootstrap_weights_.size();
     const auto wanted = static_cast<std::size_t>(options_.bootstrap);
     std::vector<double> values((wanted + lengths - 1) / lengths * lengths);
     tbb::parallel_for(std::size_t{0}, (values.size() + kTask - 1) / kTask, [&](std::size_t task) {
@@ -107,37 +115,45 @@ class PrimaryChains {
   int min_edges_;
   EmissionGuide unguided_;
   PrimaryTarget target_;
-  std::vector<RunningMean> weights_;  ///< of each length, if they are apart
+  std::vector<RunningMean> bootstrap_weights_;  ///< of each length, if they are apart
 };
 
 LangevinResult run_chains(const Scene& scene, const PrimaryOptions& options,
                           const RenderOptions& render, double mutations_per_pixel,
                           Strategies strategies) {
   const double pixels = scene.camera().pixel_count();
-  Stopwatch watch;
+  RenderClock clock(render);
   const bool apart = options.direct == DirectLight::Apart;
   Film film(scene.camera().film_width, scene.camera().film_height);
   PrimaryChains chains(scene, options, strategies, apart ? kDirectDepth + 1 : 1, render.seed, film);
-  const double bootstrap_seconds = watch.restart();
+  const double bootstrap_seconds = clock.seconds();
   std::optional<DirectPass> direct;
   if (apart) {
     direct.emplace(scene, options.max_depth, render.seed);
     direct->pass();
-    direct->set_share(chains.b());
+    direct->set_share(chains.bootstrap_mean());
   }
   if (chains.all.empty() && !(direct && direct->mean() > 0.0))
     throw InputError("no path from the sensor to an emitter carries light");
+  const auto develop = [&] {
+    chains.flush();
+    const LangevinStatistics so_far = chains.statistics();
+    const double count = std::max(1.0, static_cast<double>(so_far.mutations));
+    Image image = film.develop(so_far.b * pixels / count);
+    if (direct) direct->add_to(image);
+    return image;
+  };
   const bool stopped =
-      ChainLoop(chains.all, direct ? &*direct : nullptr, render, mutations_per_pixel, pixels).run();
+      ChainLoop(chains.all, direct ? &*direct : nullptr, render, clock, mutations_per_pixel, pixels)
+          .run(develop);
 
   LangevinResult result;
-  result.statistics = chains.finish();
+  result.image = develop();
+  result.statistics = chains.statistics();
   result.statistics.stopped = stopped;
   result.statistics.bootstrap_seconds = bootstrap_seconds;
-  result.statistics.render_seconds = watch.seconds();
-  const double count = std::max(1.0, static_cast<double>(result.statistics.mutations));
-  result.image = film.develop(result.statistics.b * pixels / count);
-  if (direct) direct->finish(result);
+  result.statistics.render_seconds = clock.seconds() - bootstrap_seconds;
+  if (direct) direct->report(result.statistics);
   return result;
 }
 

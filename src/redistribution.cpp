@@ -6,6 +6,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "driftlight/error.h"
@@ -60,6 +61,18 @@ struct Redistribution {
   void set_deposit(double samples) {
     const double mean = remainders.value() / samples;
     deposit = std::max(kLeastDeposit, mean / options.redistribution.mutations_per_sample);
+  }
+
+  /// Of the films, in the mean of so many passes.
+  double unit_of(double passes) const { return unit / std::max(1.0, passes); }
+  Image by_chains(double passes) const { return film.develop(unit_of(passes)); }
+  /// The image of the samples with what chains and particles have brought in so many passes.
+  Image complete(Image image, double passes) const {
+    const Image chains = by_chains(passes);
+    const Image particles = splitting.image(passes);
+    for (std::size_t i = 0; i < image.rgb.size(); ++i)
+      image.rgb[i] += chains.rgb[i] + particles.rgb[i];
+    return image;
   }
 
   void count(const ChainFigures& figures) {
@@ -199,29 +212,27 @@ Layers shares(const Image& samples, const Image& chains, const Image& particles,
 
 LangevinResult render_redistribution(const Scene& scene, const LangevinOptions& options,
                                      const RenderOptions& render, double samples_per_pixel) {
-  const Stopwatch watch;
+  RenderClock clock(render);
   Redistribution common(scene, options, render);
-  const double pilot_seconds = watch.seconds();
-  RenderOptions after_pilot = render;
-  if (render.time) after_pilot.time = std::max(1e-3, *render.time - pilot_seconds);
+  const double pilot_seconds = clock.seconds();
   SampleFilm film(scene.camera(), render.seed, 0);
   const RedistributionSampler sampler(common);
-  const PathResult samples =
-      run_passes(after_pilot, static_cast<int>(samples_per_pixel), [&](std::uint64_t index) {
+  PathResult samples = run_passes(
+      render, clock, static_cast<int>(samples_per_pixel),
+      [&](std::uint64_t index) {
         if (common.probed) common.probed->begin_pass(index);
         film.pass(index, sampler);
         common.set_deposit(static_cast<double>(index + 1) * scene.camera().pixel_count());
-      });
+      },
+      [&](double passes) { return common.complete(film.image(passes), passes); });
 
   LangevinResult result;
-  const Image carried = film.image(samples.samples_per_pixel);
-  const Image chains = common.film.develop(common.unit / std::max(1.0, samples.samples_per_pixel));
-  const Image particles = common.splitting.image(samples.samples_per_pixel);
-  result.image = carried;
-  for (std::size_t i = 0; i < chains.rgb.size(); ++i)
-    result.image.rgb[i] += chains.rgb[i] + particles.rgb[i];
+  const double passes = samples.samples_per_pixel;
+  const Image chains = common.by_chains(passes);
+  const Image particles = common.splitting.image(passes);
   if (render.shares != nullptr)
-    *render.shares = shares(carried, chains, particles, common.splitting.families());
+    *render.shares = shares(film.image(passes), chains, particles, common.splitting.families());
+  result.image = std::move(samples.image);
   result.statistics = common.statistics();
   common.splitting.report(particles, result.statistics);
   result.statistics.mutations = result.statistics.small_step.proposed;

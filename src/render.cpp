@@ -15,7 +15,7 @@
 #include "driftlight/error.h"
 #include "driftlight/film.h"
 #include "redistribution.h"
-#include "stopwatch.h"
+#include "render_clock.h"
 
 namespace driftlight {
 
@@ -59,7 +59,7 @@ namespace {
 struct Chains {
   LangevinOptions options;
   std::optional<PathSampler> sampler;
-  RunningMean weights;  ///< f / q of the bootstrap
+  RunningMean bootstrap_weights;  ///< f / q
   std::vector<std::unique_ptr<Chain>> all;
   std::vector<GradientProbe> probes;  ///< of each, if gradients are checked
 
@@ -70,8 +70,8 @@ struct Chains {
     if (min_depth > options.max_depth) return;
     sampler.emplace(scene, options.max_depth, options.large_steps, min_depth, options.phase_space);
     const Bootstrap bootstrap(*sampler, scene, options.bootstrap, render.seed);
-    weights = bootstrap.weights();
-    if (!(weights.sum > 0.0)) return;
+    bootstrap_weights = bootstrap.weights();
+    if (!(bootstrap_weights.sum > 0.0)) return;
     if (!options.large_step_probability)
       options.large_step_probability = std::clamp(bootstrap.effective_fraction(), 0.1, 0.9);
     for (const PathSampler::Sample& start : bootstrap.resample(options.chains)) {
@@ -92,11 +92,15 @@ struct Chains {
     return table;
   }
 
+  /// Deposits all that the chains have gathered.
+  void flush() {
+    for (const auto& chain : all) chain->flush();
+  }
   /// Statistics in the order of the chains: the same for any number of threads.
-  LangevinStatistics finish() {
+  LangevinStatistics statistics() const {
     LangevinStatistics sum;
+    RunningMean weights = bootstrap_weights;
     for (const auto& chain : all) {
-      chain->flush();
       sum += chain->statistics();
       weights += chain->weights();
     }
@@ -110,32 +114,40 @@ struct Chains {
 LangevinResult run_langevin(const Scene& scene, const LangevinOptions& options,
                             const RenderOptions& render, double mutations_per_pixel) {
   const double pixels = scene.camera().pixel_count();
-  Stopwatch watch;
+  RenderClock clock(render);
   const bool apart = options.direct == DirectLight::Apart;
   Film film(scene.camera().film_width, scene.camera().film_height);
   Chains chains(scene, options, render, apart ? kDirectDepth + 1 : 1, film);
-  const double bootstrap_seconds = watch.restart();
+  const double bootstrap_seconds = clock.seconds();
   std::optional<DirectPass> direct;
   if (apart) {
     direct.emplace(scene, options.max_depth, render.seed);
     direct->pass();
-    direct->set_share(chains.weights.mean());
+    direct->set_share(chains.bootstrap_weights.mean());
   }
   if (chains.all.empty() && !(direct && direct->mean() > 0.0))
     throw InputError("no path from the sensor to an emitter carries light");
+  const auto develop = [&] {
+    chains.flush();
+    const LangevinStatistics so_far = chains.statistics();
+    const double count = std::max(1.0, static_cast<double>(so_far.mutations));
+    Image image = film.develop(so_far.b * pixels / count);
+    if (direct) direct->add_to(image);
+    return image;
+  };
   const bool stopped =
-      ChainLoop(chains.all, direct ? &*direct : nullptr, render, mutations_per_pixel, pixels).run();
+      ChainLoop(chains.all, direct ? &*direct : nullptr, render, clock, mutations_per_pixel, pixels)
+          .run(develop);
 
   LangevinResult result;
+  result.image = develop();
   LangevinStatistics& statistics = result.statistics;
-  statistics = chains.finish();
+  statistics = chains.statistics();
   if (render.check_gradients) result.gradient_check = chains.gradient_check();
   statistics.stopped = stopped;
   statistics.bootstrap_seconds = bootstrap_seconds;
-  statistics.render_seconds = watch.seconds();
-  const double count = std::max(1.0, static_cast<double>(statistics.mutations));
-  result.image = film.develop(statistics.b * pixels / count);
-  if (direct) direct->finish(result);
+  statistics.render_seconds = clock.seconds() - bootstrap_seconds;
+  if (direct) direct->report(statistics);
   return result;
 }
 

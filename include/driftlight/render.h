@@ -18,6 +18,14 @@ namespace driftlight {
 
 class StepLayers;
 
+/// The image of a render on the way.
+struct Snapshot {
+  double fraction = 0;  ///< that it was asked for
+  double seconds = 0;   ///< of the render so far, without what snapshots took
+  double work = 0;      ///< so far: samples per pixel, with Mode::Chain mutations per pixel
+  Image image;
+};
+
 struct Progress {
   double fraction = 0;  ///< of the work or of the time, in [0, 1]
   double elapsed = 0;   ///< seconds
@@ -28,10 +36,17 @@ struct RenderOptions {
   /// Threads of the machine; 0: all. The image does not depend on it.
   int threads = 0;
   std::uint64_t seed = 0;
-  /// Seconds to render; the image then depends on the machine's speed. None: by work.
+  /// Seconds to render, with the bootstrap or the pilot; the image then depends on the machine's
+  /// speed. None: by work.
   std::optional<double> time;
   /// Called now and then, from one thread at a time.
   std::function<void(const Progress&)> progress;
+  /// Fractions of the time or of the work in (0, 1], rising, at which `snapshot` receives the image
+  /// so far: at the first pass or round that ends there or later, and only once where that passes
+  /// several of them. Time spent on it does not count. The image does not depend on it, but for
+  /// rounding with Mode::Chain.
+  std::vector<double> snapshot_at;
+  std::function<void(Snapshot)> snapshot;
   /// When it turns true the render ends early and returns what it has.
   const std::atomic<bool>* stop = nullptr;
   /// Where the Langevin sampler records its small steps, if not null. The image does not depend on

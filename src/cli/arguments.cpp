@@ -14,6 +14,7 @@
 #include <system_error>
 #include <type_traits>
 
+#include "cli/terms_study.h"
 #include "driftlight/path.h"
 
 namespace driftlight::cli {
@@ -79,6 +80,10 @@ struct Raw {
   std::string image;
   std::string reference;
   bool json = false;
+  std::string choices;
+  std::string study;
+  std::string runs = "3";
+  std::string folder;
 };
 
 /// An option that may be repeated and takes one argument each time.
@@ -133,6 +138,46 @@ void declare_render(CLI::App& app, Raw& raw) {
   app.add_flag("-q,--quiet", raw.quiet, "say nothing but errors");
 }
 
+void declare_compare(CLI::App& app, Raw& raw) {
+  app.add_option("scene", raw.scene, "Mitsuba scene file (XML)")->required()->type_name("SCENE");
+  app.add_option("--integrators", raw.choices,
+                 "what to compare, separated by commas: integrators as `render` takes them, each "
+                 "with options if need be, as in bdpt,langevin:mode=chain:scale=0.2")
+      ->type_name("NAME[:OPTION=VALUE]..,..");
+  app.add_option("--study", raw.study,
+                 "terms: instead of --integrators, langevin with mode=chain and each "
+                 "preconditioner, drift and time-step rule, at equal time and at equal mutations")
+      ->type_name("STUDY");
+  app.add_option("--reference", raw.reference,
+                 "image to measure errors against; without it they follow from the spread between "
+                 "runs alone")
+      ->type_name("FILE");
+  app.add_option("-o,--out", raw.folder,
+                 "folder to make: results.json, results.csv, report.html and images")
+      ->required()
+      ->type_name("DIR");
+  app.add_option("--time", raw.time, "render each run for this long (default: 10)")
+      ->type_name("SECONDS");
+  app.add_option("--spp", raw.samples_per_pixel,
+                 "instead of a time, the same work: samples per pixel")
+      ->type_name("N");
+  app.add_option("--mutations-per-pixel", raw.mutations_per_pixel,
+                 "likewise, of langevin with mode=chain; may stand beside --spp, with --study "
+                 "beside --time (default there: 100)")
+      ->type_name("N");
+  app.add_option("--runs", raw.runs, "independent runs of each, at least 2")
+      ->type_name("N")
+      ->capture_default_str();
+  add_repeatable(app, "-D,--define", raw.defines, "value for $NAME in the scene; repeatable")
+      ->type_name("NAME=VALUE");
+  app.add_option("-t,--threads", raw.threads, "threads; 0: all")
+      ->type_name("N")
+      ->capture_default_str();
+  app.add_option("--seed", raw.seed, "seed of the first run; each run has its own")
+      ->type_name("N")
+      ->capture_default_str();
+}
+
 void declare_gradcheck(CLI::App& app, Raw& raw) {
   app.add_option("scene", raw.scene, "Mitsuba scene file (XML)")->required()->type_name("SCENE");
   add_repeatable(app, "-D,--define", raw.defines, "value for $NAME in the scene; repeatable")
@@ -178,6 +223,16 @@ SceneArguments scene_arguments(const Raw& raw) {
   return scene;
 }
 
+Work parse_work(const Raw& raw) {
+  Work work;
+  if (raw.time) work.time = parse_number("--time", *raw.time, 0.0);
+  if (raw.mutations_per_pixel)
+    work.mutations_per_pixel = parse_number("--mutations-per-pixel", *raw.mutations_per_pixel, 0.0);
+  if (raw.samples_per_pixel)
+    work.samples_per_pixel = parse_number("--spp", *raw.samples_per_pixel, 1);
+  return work;
+}
+
 /// At most one of the three, and one that the integrator has.
 void set_work(const Raw& raw, RenderCommand& command) {
   const int given =
@@ -192,12 +247,7 @@ void set_work(const Raw& raw, RenderCommand& command) {
                     raw.integrator));
   if (raw.samples_per_pixel && primary)
     throw UsageError(fmt::format("{} takes --mutations-per-pixel, not --spp", raw.integrator));
-  if (raw.time) command.time = parse_number("--time", *raw.time, 0.0);
-  if (raw.mutations_per_pixel)
-    command.mutations_per_pixel =
-        parse_number("--mutations-per-pixel", *raw.mutations_per_pixel, 0.0);
-  if (raw.samples_per_pixel)
-    command.samples_per_pixel = parse_number("--spp", *raw.samples_per_pixel, 1);
+  command.work = parse_work(raw);
 }
 
 /// The file of a flag that belongs to one integrator: in a format with named channels, and not over
@@ -249,6 +299,73 @@ RenderCommand render_command(const Raw& raw) {
   return command;
 }
 
+/// The parts of `text` between separators: one more than there are of these.
+std::vector<std::string> split(const std::string& text, char separator) {
+  std::vector<std::string> parts;
+  std::size_t start = 0;
+  for (std::size_t end = 0; end != std::string::npos; start = end + 1) {
+    end = text.find(separator, start);
+    parts.push_back(text.substr(start, end - start));
+  }
+  return parts;
+}
+
+/// "langevin:mode=chain:scale=0.2"
+IntegratorChoice parse_choice(const std::string& text) {
+  const std::vector<std::string> parts = split(text, ':');
+  IntegratorChoice choice{.name = text, .integrator = parse_integrator(parts[0]), .settings = {}};
+  for (std::size_t i = 1; i < parts.size(); ++i)
+    choice.settings.push_back(
+        split_setting(fmt::format("the setting of {} in --integrators", parts[0]), parts[i]));
+  return choice;
+}
+
+constexpr double kCompareSeconds = 10;
+constexpr double kStudyMutations = 100;
+
+/// Its integrators, at equal time and at equal mutations.
+void set_study(const Raw& raw, CompareCommand& command) {
+  if (raw.study != "terms")
+    throw UsageError(fmt::format("unknown study '{}'; the study is terms", raw.study));
+  if (raw.samples_per_pixel)
+    throw UsageError("--study takes --time and --mutations-per-pixel, not --spp");
+  const Work given = parse_work(raw);
+  Work equal_time;
+  equal_time.time = given.time.value_or(kCompareSeconds);
+  Work equal_mutations;
+  equal_mutations.mutations_per_pixel = given.mutations_per_pixel.value_or(kStudyMutations);
+  command.integrators = terms_of_the_step();
+  command.budgets = {{"equal_time", equal_time}, {"equal_mutations", equal_mutations}};
+}
+
+CompareCommand compare_command(const Raw& raw) {
+  CompareCommand command;
+  command.scene = scene_arguments(raw);
+  if (!raw.reference.empty()) command.reference = raw.reference;
+  command.runs = parse_number("--runs", raw.runs, 2);
+  command.threads = parse_number("--threads", raw.threads, 0);
+  command.seed = parse_number("--seed", raw.seed, std::uint64_t{0});
+  command.folder = raw.folder;
+  if (raw.choices.empty() == raw.study.empty())
+    throw UsageError("give either --integrators or --study");
+  if (!raw.study.empty()) {
+    set_study(raw, command);
+    return command;
+  }
+  for (const std::string& text : split(raw.choices, ',')) {
+    for (const IntegratorChoice& other : command.integrators)
+      if (other.name == text) throw UsageError(fmt::format("--integrators names '{}' twice", text));
+    command.integrators.push_back(parse_choice(text));
+  }
+  Work work = parse_work(raw);
+  const bool by_work = work.mutations_per_pixel || work.samples_per_pixel;
+  if (by_work && work.time)
+    throw UsageError("give either --time, or --spp and --mutations-per-pixel");
+  if (!by_work && !work.time) work.time = kCompareSeconds;
+  command.budgets = {{"", work}};
+  return command;
+}
+
 GradcheckCommand gradcheck_command(const Raw& raw) {
   GradcheckCommand command;
   command.scene = scene_arguments(raw);
@@ -284,11 +401,14 @@ Command parse_arguments(int argc, const char* const* argv) {
   app.set_version_flag("--version", "driftlight " DRIFTLIGHT_VERSION);
   app.require_subcommand(1);
   CLI::App& render = *app.add_subcommand("render", "render a scene");
+  CLI::App& compare = *app.add_subcommand(
+      "compare", "compare integrators over runs of the same time, with a page of the results");
   CLI::App& gradcheck = *app.add_subcommand(
       "gradcheck", "compare the derivatives of a scene's paths with independent ones");
   CLI::App& info = *app.add_subcommand("info", "what is in a scene, or the integrators");
   CLI::App& diff = *app.add_subcommand("diff", "compare an image with a reference");
   declare_render(render, raw);
+  declare_compare(compare, raw);
   declare_gradcheck(gradcheck, raw);
   declare_info(info, raw);
   declare_diff(diff, raw);
@@ -300,6 +420,7 @@ Command parse_arguments(int argc, const char* const* argv) {
     throw UsageError(error.what());
   }
   if (render.parsed()) return render_command(raw);
+  if (compare.parsed()) return compare_command(raw);
   if (gradcheck.parsed()) return gradcheck_command(raw);
   if (diff.parsed()) return DiffCommand{raw.image, raw.reference, raw.json};
   if (raw.integrators == !raw.scene.empty())

@@ -31,15 +31,24 @@ struct SceneArguments {
   std::map<std::string, std::string> defines;
 };
 
+/// Options of an integrator by name, with their values.
+using Settings = std::vector<std::pair<std::string, std::string>>;
+
+/// How long to render. Of the last two, the one that counts the integrator's work is used if no
+/// time is given.
+struct Work {
+  std::optional<double> time;  ///< seconds
+  std::optional<double> mutations_per_pixel;
+  std::optional<int> samples_per_pixel;
+};
+
 /// driftlight render
 struct RenderCommand {
   SceneArguments scene;
   std::vector<std::filesystem::path> outputs;  ///< at least one
   Integrator integrator = Integrator::Langevin;
-  std::vector<std::pair<std::string, std::string>> settings;
-  std::optional<double> time;
-  std::optional<double> mutations_per_pixel;
-  std::optional<int> samples_per_pixel;
+  Settings settings;
+  Work work;
   int threads = 0;
   std::uint64_t seed = 0;
   std::optional<std::filesystem::path> statistics;
@@ -48,6 +57,32 @@ struct RenderCommand {
   std::optional<std::filesystem::path> shares;      ///< ends in .exr
   bool check_gradients = false;
   Verbosity verbosity = Verbosity::Normal;
+};
+
+/// An integrator with settings, as `compare` takes it: NAME[:OPTION=VALUE]...
+struct IntegratorChoice {
+  std::string name;  ///< as it was written, or for a study made up
+  Integrator integrator = Integrator::Langevin;
+  Settings settings;
+};
+
+/// What all runs of a comparison are given.
+struct Budget {
+  std::string folder;  ///< of its results, within that of the command; empty: that one itself
+  Work work;
+};
+
+/// driftlight compare
+struct CompareCommand {
+  SceneArguments scene;
+  std::optional<std::filesystem::path> reference;
+  std::vector<IntegratorChoice> integrators;  ///< at least one, no two of the same name
+  /// One; of the study of terms two, equal time and equal mutations.
+  std::vector<Budget> budgets;
+  int runs = 3;  ///< of each integrator, at least two
+  int threads = 0;
+  std::uint64_t seed = 0;
+  std::filesystem::path folder;
 };
 
 /// driftlight gradcheck
@@ -82,8 +117,8 @@ struct PrintCommand {
   std::string text;
 };
 
-using Command = std::variant<RenderCommand, GradcheckCommand, InfoCommand, IntegratorsCommand,
-                             DiffCommand, PrintCommand>;
+using Command = std::variant<RenderCommand, CompareCommand, GradcheckCommand, InfoCommand,
+                             IntegratorsCommand, DiffCommand, PrintCommand>;
 
 /// As users write it.
 std::string_view name_of(Integrator integrator);

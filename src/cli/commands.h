@@ -7,6 +7,7 @@
 namespace driftlight::cli {
 
 void run(const RenderCommand& command);
+void run(const CompareCommand& command);
 void run(const GradcheckCommand& command);
 void run(const InfoCommand& command);
 void run(const IntegratorsCommand& command);

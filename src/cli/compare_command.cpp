@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cli/commands.h"
+#include "cli/comparison.h"
+#include "cli/comparison_page.h"
+#include "cli/comparison_results.h"
+#include "cli/error_map.h"
+#include "cli/interrupt.h"
+#include "cli/print.h"
+#include "cli/progress_bar.h"
+#include "cli/terms_study.h"
+#include "cli/text_file.h"
+#include "driftlight/error.h"
+#include "driftlight/image.h"
+#include "driftlight/scalar.h"
+#include "driftlight/scene_file.h"
+#include "pending_folder.h"
+#include "run_figures.h"
+
+namespace driftlight::cli {
+
+namespace {
+
+/// Brightness of a shown image in the middle.
+constexpr double kMiddleGrey = 0.18;
+
+/// Throws InputError if it cannot be read or is not of the scene's size.
+std::optional<Image> read_reference(const CompareCommand& command,
+                                    const PerspectiveCamera& camera) {
+  if (!command.reference) return std::nullopt;
+  Image image = read_image(*command.reference);
+  if (image.width != camera.film_width || image.height != camera.film_height)
+    throw InputError(fmt::format("the reference '{}' has {} x {} pixels, the scene {} x {}",
+                                 command.reference->string(), image.width, image.height,
+                                 camera.film_width, camera.film_height));
+  return image;
+}
+
+LoadedScene load(const CompareCommand& command) {
+  LoadedScene loaded = load_scene(command.scene.file, {.defines = command.scene.defines});
+  for (const std::string& notice : loaded.notices) print_notice(notice);
+  return loaded;
+}
+
+/// Says each notice once.
+void take_depths(const LoadedScene& loaded, std::vector<Contender>& contenders) {
+  std::set<std::string> notices;
+  for (Contender& contender : contenders)
+    notices.insert(take_depth(loaded, contender.choice.settings, contender.options));
+  for (const std::string& notice : notices)
+    if (!notice.empty()) print_notice(notice);
+}
+
+/// A power of two that brings the median of what is lit near middle grey.
+double exposure_for(const Image& image) {
+  std::vector<double> lit;
+  for (std::size_t i = 0; i < image.rgb.size(); i += 3) {
+    const double y =
+        luminance(Rgbd(static_cast<double>(image.rgb[i]), static_cast<double>(image.rgb[i + 1]),
+                       static_cast<double>(image.rgb[i + 2])));
+    if (y > 0.0 && std::isfinite(y)) lit.push_back(y);
+  }
+  return lit.empty() ? 1.0 : std::exp2(std::round(std::log2(kMiddleGrey / median(std::move(lit)))));
+}
+
+void write_exposed(const std::filesystem::path& file, Image image, double exposure) {
+  for (float& x : image.rgb) x *= static_cast<float>(exposure);
+  write_image(file, image);
+}
+
+/// Writes the images of a contender: its first run, and where that is wrong.
+PagePicture write_pictures(const std::filesystem::path& folder, const Contender& contender,
+                           const std::optional<Image>& reference, double exposure) {
+  const std::string stem = file_stem(contender.choice);
+  const Image& image = contender.final_image(0);
+  PagePicture picture{contender.choice.name, folder / (stem + ".png"),
+                      folder / (stem + "_error.png")};
+  write_image(folder / (stem + ".exr"), image, contender.runs.front().metadata);
+  write_exposed(picture.image, image, exposure);
+  const std::vector<double> errors =
+      reference ? pixel_errors(image, *reference) : pixel_spread(image, contender.final_image(1));
+  write_image(picture.error, error_map(errors, image.width));
+  return picture;
+}
+
+void write_all(const std::filesystem::path& folder, const std::vector<Contender>& contenders,
+               const std::optional<Image>& reference, nlohmann::ordered_json& results) {
+  const double exposure = exposure_for(reference ? *reference : contenders.front().final_image(0));
+  results["exposure"] = exposure;
+  std::vector<PagePicture> pictures;
+  if (reference) {
+    pictures.push_back({"reference", folder / "reference.png", {}});
+    write_exposed(pictures.back().image, *reference, exposure);
+  }
+  for (const Contender& contender : contenders)
+    pictures.push_back(write_pictures(folder, contender, reference, exposure));
+  const std::filesystem::path scale = folder / "error_scale.png";
+  write_image(scale, error_scale(256));
+  write_text(folder / "results.json", results.dump(2) + "\n");
+  write_text(folder / "results.csv", csv_text(results));
+  write_text(folder / "report.html", page_text(results, pictures, scale));
+}
+
+struct Compared {
+  std::vector<Contender> contenders;
+  nlohmann::ordered_json results;
+};
+
+/// Renders all runs with one budget.
+Compared compare(const LoadedScene& loaded, const CompareCommand& command, const Work& work,
+                 const std::optional<Image>& reference) {
+  std::vector<Contender> contenders = contenders_of(command.integrators, work);
+  take_depths(loaded, contenders);
+  {
+    ProgressBar bar(true);
+    render_runs(
+        loaded.scene, command, work, stop_on_interrupt(),
+        [&](const Progress& progress) { bar.update(progress); }, contenders);
+  }
+  const std::size_t complete = contenders.front().runs.size();
+  if (complete < static_cast<std::size_t>(command.runs))
+    print_notice(fmt::format("stopped early: {} of {} runs of each", complete, command.runs));
+  nlohmann::ordered_json results = comparison_results(command, work, contenders, reference);
+  return {std::move(contenders), std::move(results)};
+}
+
+/// What the terminal shows; the table of a study also goes into its folder.
+std::string summarize(const std::vector<nlohmann::ordered_json>& results,
+                      const std::filesystem::path& folder) {
+  if (results.size() == 1) return summary_text(results.front());
+  write_text(folder / "terms.csv", terms_csv(results[0], results[1]));
+  return terms_table(results[0], results[1]);
+}
+
+}  // namespace
+
+void run(const CompareCommand& command) {
+  for (const Budget& budget : command.budgets) contenders_of(command.integrators, budget.work);
+  check_folder_target(command.folder);
+  const LoadedScene loaded = load(command);
+  const std::optional<Image> reference = read_reference(command, loaded.scene.camera());
+  if (!reference)
+    print_notice(
+        "there is no reference: errors follow from the spread between runs, which shows no bias");
+
+  // Made when there is something to put into it.
+  std::optional<PendingFolder> pending;
+  std::vector<nlohmann::ordered_json> results;
+  std::string written;
+  for (const Budget& budget : command.budgets) {
+    Compared compared = compare(loaded, command, budget.work, reference);
+    if (!pending) pending.emplace(command.folder);
+    const std::filesystem::path folder = pending->temporary() / budget.folder;
+    std::filesystem::create_directories(folder);
+    write_all(folder, compared.contenders, reference, compared.results);
+    results.push_back(std::move(compared.results));
+    written += fmt::format("wrote {}\n", (command.folder / budget.folder / "report.html").string());
+  }
+  const std::string summary = summarize(results, pending->temporary());
+  pending->commit();
+  print(summary + written);
+}
+
+}  // namespace driftlight::cli
