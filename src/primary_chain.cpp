@@ -21,6 +21,7 @@ void PrimaryChain::run(std::uint64_t mutations) {
     const bool large = rng_.uniform() < large_step_probability_;
     point_.each([&](PrimarySample& part) { large ? part.propose_large() : part.propose_small(); });
     proposed_.target = target_(point_, proposed_.splats);
+    statistics_.rejections.non_finite += target_.take_non_finite();
     if (large) weights_.add(proposed_.target);
     const double acceptance = std::min(1.0, proposed_.target / current_.target);
     KernelStatistics& kernel = large ? statistics_.large_step : statistics_.small_step;

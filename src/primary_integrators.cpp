@@ -7,12 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <optional>
 #include <vector>
 
-#include "chain_loop.h"
-#include "direct_pass.h"
-#include "driftlight/error.h"
+#include "chain_run.h"
 #include "driftlight/render.h"
 #include "primary_chain.h"
 #include "systematic_resampling.h"
@@ -47,6 +44,10 @@ class PrimaryChains {
       all.push_back(std::make_unique<PrimaryChain>(target_, options, film, point(i),
                                                    Rng(seed, Stream::Chain, all.size())));
   }
+
+  // The chains' targets refer to it.
+  PrimaryChains(const PrimaryChains&) = delete;
+  PrimaryChains& operator=(const PrimaryChains&) = delete;
 
   /// Deposits all that the chains have gathered.
   void flush() {
@@ -118,52 +119,19 @@ class PrimaryChains {
   std::vector<RunningMean> bootstrap_weights_;  ///< of each length, if they are apart
 };
 
-LangevinResult run_chains(const Scene& scene, const PrimaryOptions& options,
-                          const RenderOptions& render, double mutations_per_pixel,
-                          Strategies strategies) {
-  const double pixels = scene.camera().pixel_count();
-  RenderClock clock(render);
-  const bool apart = options.direct == DirectLight::Apart;
-  Film film(scene.camera().film_width, scene.camera().film_height);
-  PrimaryChains chains(scene, options, strategies, apart ? kDirectDepth + 1 : 1, render.seed, film);
-  const double bootstrap_seconds = clock.seconds();
-  std::optional<DirectPass> direct;
-  if (apart) {
-    direct.emplace(scene, options.max_depth, render.seed);
-    direct->pass();
-    direct->set_share(chains.bootstrap_mean());
-  }
-  if (chains.all.empty() && !(direct && direct->mean() > 0.0))
-    throw InputError("no path from the sensor to an emitter carries light");
-  const auto develop = [&] {
-    chains.flush();
-    const LangevinStatistics so_far = chains.statistics();
-    const double count = std::max(1.0, static_cast<double>(so_far.mutations));
-    Image image = film.develop(so_far.b * pixels / count);
-    if (direct) direct->add_to(image);
-    return image;
-  };
-  const bool stopped =
-      ChainLoop(chains.all, direct ? &*direct : nullptr, render, clock, mutations_per_pixel, pixels)
-          .run(develop);
-
-  LangevinResult result;
-  result.image = develop();
-  result.statistics = chains.statistics();
-  result.statistics.stopped = stopped;
-  result.statistics.bootstrap_seconds = bootstrap_seconds;
-  result.statistics.render_seconds = clock.seconds() - bootstrap_seconds;
-  if (direct) direct->report(result.statistics);
-  return result;
-}
-
 LangevinResult render_primary(const Scene& scene, const PrimaryOptions& options,
                               const RenderOptions& render, double mutations_per_pixel,
                               Strategies strategies) {
   options.validate();
   tbb::task_arena arena(render.threads > 0 ? render.threads : tbb::task_arena::automatic);
-  return arena.execute(
-      [&] { return run_chains(scene, options, render, mutations_per_pixel, strategies); });
+  return arena.execute([&] {
+    return run_chains(
+        scene, options.direct, options.max_depth, render, mutations_per_pixel,
+        [&](int min_edges, Film& film) {
+          return PrimaryChains(scene, options, strategies, min_edges, render.seed, film);
+        },
+        [](const PrimaryChains&, LangevinResult&) {});
+  });
 }
 
 }  // namespace

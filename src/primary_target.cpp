@@ -12,13 +12,18 @@ struct Sink {
   Vec2d film;
   int min_edges;
   double factor;
+  std::uint64_t& non_finite;
 
   void add(const Rgbd& value, const FoundPath& path) { splat(film, value, path); }
   void splat(const Vec2d& at, const Rgbd& value, const FoundPath& path) {
     if (path.s + path.t - 1 < min_edges) return;
-    const double y = factor * luminance(value);
-    if (!(y > 0.0) || !std::isfinite(y)) return;
-    splats.push_back({at, value * (factor / y), y});
+    const double y = luminance(value);
+    if (y == 0.0) return;
+    if (!std::isfinite(y)) {
+      ++non_finite;
+      return;
+    }
+    splats.push_back({at, value / y, factor * y});
   }
 };
 
@@ -46,12 +51,12 @@ double PrimaryTarget::operator()(PrimaryPoint& point, std::vector<PrimarySplat>&
   const SampleNumbers numbers{sensor, light, connection};
   const Vec2d film = sensor.uniform2();
   if (strategies_ == Strategies::All) {
-    Sink sink{splats, film, min_edges_, 1.0};
+    Sink sink{splats, film, min_edges_, 1.0, non_finite_};
     tracer_.sample(film, numbers, sink);
   } else {
     const int count = point.edges + 1;
     const int s = std::min(static_cast<int>(count * point.strategy.next()), point.edges);
-    Sink sink{splats, film, min_edges_, static_cast<double>(count)};
+    Sink sink{splats, film, min_edges_, static_cast<double>(count), non_finite_};
     tracer_.sample_strategy(s, count - s, film, numbers, sink);
   }
   double sum = 0.0;

@@ -2,7 +2,8 @@
 /// The light of primary samples: the target of chains in primary sample space.
 #pragma once
 
-#include <optional>
+#include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "bidirectional_tracer.h"
@@ -51,14 +52,18 @@ class PrimaryTarget {
   PrimaryTarget(const Scene& scene, const EmissionGuide& unguided, Strategies strategies,
                 int min_edges, int max_edges);
 
-  /// I; what the point puts on the film, in place of what `splats` held. A value that is not finite
-  /// is no light.
+  /// I; what the point puts on the film, in place of what `splats` held. Values that are not finite
+  /// are no light, and counted.
   double operator()(PrimaryPoint& point, std::vector<PrimarySplat>& splats);
+
+  /// Since they were last taken.
+  std::uint64_t take_non_finite() { return std::exchange(non_finite_, 0); }
 
  private:
   BidirectionalTracer tracer_;
   Strategies strategies_;
   int min_edges_;
+  std::uint64_t non_finite_ = 0;
 };
 
 }  // namespace driftlight

@@ -8,14 +8,12 @@
 #include <optional>
 #include <vector>
 
-#include "chain_loop.h"
-#include "direct_pass.h"
+#include "chain_run.h"
 #include "driftlight/bootstrap.h"
 #include "driftlight/chain.h"
 #include "driftlight/error.h"
 #include "driftlight/film.h"
 #include "redistribution.h"
-#include "render_clock.h"
 
 namespace driftlight {
 
@@ -85,12 +83,18 @@ struct Chains {
     for (std::size_t i = 0; i < all.size(); ++i) all[i]->observe(probes[i]);
   }
 
+  double bootstrap_mean() const { return bootstrap_weights.mean(); }
+
   GradientTable gradient_check() const {
     GradientTable table;
     for (const GradientProbe& probe : probes)
       for (const CheckedPath& path : probe.paths()) table.add(path);
     return table;
   }
+
+  // The chains refer to it.
+  Chains(const Chains&) = delete;
+  Chains& operator=(const Chains&) = delete;
 
   /// Deposits all that the chains have gathered.
   void flush() {
@@ -113,42 +117,12 @@ struct Chains {
 
 LangevinResult run_langevin(const Scene& scene, const LangevinOptions& options,
                             const RenderOptions& render, double mutations_per_pixel) {
-  const double pixels = scene.camera().pixel_count();
-  RenderClock clock(render);
-  const bool apart = options.direct == DirectLight::Apart;
-  Film film(scene.camera().film_width, scene.camera().film_height);
-  Chains chains(scene, options, render, apart ? kDirectDepth + 1 : 1, film);
-  const double bootstrap_seconds = clock.seconds();
-  std::optional<DirectPass> direct;
-  if (apart) {
-    direct.emplace(scene, options.max_depth, render.seed);
-    direct->pass();
-    direct->set_share(chains.bootstrap_weights.mean());
-  }
-  if (chains.all.empty() && !(direct && direct->mean() > 0.0))
-    throw InputError("no path from the sensor to an emitter carries light");
-  const auto develop = [&] {
-    chains.flush();
-    const LangevinStatistics so_far = chains.statistics();
-    const double count = std::max(1.0, static_cast<double>(so_far.mutations));
-    Image image = film.develop(so_far.b * pixels / count);
-    if (direct) direct->add_to(image);
-    return image;
-  };
-  const bool stopped =
-      ChainLoop(chains.all, direct ? &*direct : nullptr, render, clock, mutations_per_pixel, pixels)
-          .run(develop);
-
-  LangevinResult result;
-  result.image = develop();
-  LangevinStatistics& statistics = result.statistics;
-  statistics = chains.statistics();
-  if (render.check_gradients) result.gradient_check = chains.gradient_check();
-  statistics.stopped = stopped;
-  statistics.bootstrap_seconds = bootstrap_seconds;
-  statistics.render_seconds = clock.seconds() - bootstrap_seconds;
-  if (direct) direct->report(statistics);
-  return result;
+  return run_chains(
+      scene, options.direct, options.max_depth, render, mutations_per_pixel,
+      [&](int min_edges, Film& film) { return Chains(scene, options, render, min_edges, film); },
+      [&](const Chains& chains, LangevinResult& result) {
+        if (render.check_gradients) result.gradient_check = chains.gradient_check();
+      });
 }
 
 }  // namespace

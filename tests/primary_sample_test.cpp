@@ -143,6 +143,29 @@ TEST(PrimaryTarget, HasTheIntegralOfAClosedFurnace) {
   EXPECT_LT(all.error(), 0.02 * expected);
 }
 
+/// However dim a path is, its colour is one of luminance 1: the film cannot overflow.
+TEST(PrimaryTarget, ColoursAreBoundedWhereLightHardlyIs) {
+  const Scene bright = furnace(0.6);
+  auto emitter = std::get<AreaEmitter>(bright.emitters()[0]);
+  emitter.radiance = {3e-312, 1e-310, 2e-311};
+  const Scene scene = bright.with_emitters({emitter});
+  const EmissionGuide unguided(scene);
+  const PrimaryOptions options;
+  PrimaryTarget target(scene, unguided, PrimaryTarget::Strategies::All, 1, 5);
+  std::vector<PrimarySplat> splats;
+  int seen = 0;
+  for (std::uint64_t i = 0; i < 100; ++i) {
+    PrimaryPoint point(options, 5, Stream::Test, i);
+    target(point, splats);
+    for (const PrimarySplat& splat : splats) {
+      ++seen;
+      ASSERT_NEAR(luminance(splat.color), 1.0, 0.01);
+    }
+  }
+  EXPECT_GT(seen, 100);
+  EXPECT_EQ(target.take_non_finite(), 0U);
+}
+
 TEST(Primary, DoesNotDependOnThreads) {
   const Scene scene = furnace(0.6);
   PssmltOptions pssmlt;
