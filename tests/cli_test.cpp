@@ -202,8 +202,11 @@ TEST_F(Cli, AMistakeLeavesAnOlderImageAlone) {
 
 TEST_F(Cli, HelpAndVersionSucceed) {
   EXPECT_EQ(run({"--version"}).out.rfind("driftlight ", 0), 0U);
-  for (const auto& arguments : std::vector<std::vector<std::string>>{
-           {"--help"}, {"render", "--help"}, {"info", "--help"}, {"diff", "-h"}}) {
+  for (const auto& arguments : std::vector<std::vector<std::string>>{{"--help"},
+                                                                     {"render", "--help"},
+                                                                     {"compare", "--help"},
+                                                                     {"info", "--help"},
+                                                                     {"diff", "-h"}}) {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.exit_code, 0);
     EXPECT_NE(outcome.out.find("Usage"), std::string::npos) << outcome.out;

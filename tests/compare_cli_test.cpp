@@ -95,6 +95,17 @@ class CompareCli : public ::testing::Test {
   }
   const std::filesystem::path& scratch() const { return directory_.path(); }
 
+  /// The elements of a page after its scripts have run.
+  std::string dom_of(const std::string& browser, const std::filesystem::path& page) const {
+    test::Process process(
+        {browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
+         "--user-data-dir=" + (scratch() / "profile").string(), "--virtual-time-budget=5000",
+         "--dump-dom", "file://" + page.string()},
+        folder(), scratch());
+    EXPECT_EQ(process.exit_code(), 0) << process.standard_error();
+    return process.standard_output();
+  }
+
  private:
   test::SceneDirectory directory_;
 };
@@ -451,15 +462,8 @@ TEST_F(CompareCli, ThePageRunsInABrowser) {
     if (with_reference) arguments.insert(arguments.end(), {"--reference", "reference.exr"});
     const Outcome outcome = run(arguments);
     ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-    const std::filesystem::path page =
-        folder() / (with_reference ? "with" : "without") / "report.html";
-    test::Process process(
-        {*browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
-         "--user-data-dir=" + (scratch() / "profile").string(), "--virtual-time-budget=5000",
-         "--dump-dom", "file://" + page.string()},
-        folder(), scratch());
-    ASSERT_EQ(process.exit_code(), 0) << process.standard_error();
-    const std::string dom = process.standard_output();
+    const std::string dom =
+        dom_of(*browser, folder() / (with_reference ? "with" : "without") / "report.html");
     const std::string head = dom.substr(0, dom.find("<head>"));
     EXPECT_TRUE(contains(head, "data-ready=\"yes\"")) << head;
     EXPECT_FALSE(contains(head, "data-error")) << head;
@@ -476,6 +480,51 @@ TEST_F(CompareCli, ThePageRunsInABrowser) {
     EXPECT_FALSE(contains(dom, "NaN"));
     EXPECT_FALSE(contains(dom, "undefined<"));
   }
+}
+
+TEST_F(CompareCli, KeysAndButtonsFlipThroughTheImages) {
+  const std::optional<std::string> browser = find_browser();
+  if (!browser) GTEST_SKIP() << "there is no chromium";
+  render_reference();
+  ASSERT_EQ(compare({"--reference", "reference.exr", "--integrators", "path,bdpt", "--spp", "2",
+                     "--runs", "2"})
+                .exit_code,
+            0);
+  std::string page = read("out/report.html");
+  page.insert(page.rfind("</body>"), R"script(<script>
+const seen = [];
+const see = () => seen.push(byId("caption").textContent);
+const press = (key) => { dispatchEvent(new KeyboardEvent("keydown", { key })); see(); };
+const shown = (name) => pictures.find((picture) => picture.name === name);
+see();
+for (const key of ["1", "ArrowRight", " ", " ", "3", "4", "ArrowRight"]) press(key);
+const image_is_right = byId("picture").src === shown("bdpt").image;
+press("e");
+const error_is_right = byId("picture").src === shown("bdpt").error;
+byId("choices").children[1].click();
+see();
+byId("choices").children[0].click();
+see();
+press("e");
+byId("stage").dispatchEvent(
+  new WheelEvent("wheel", { deltaY: -800, clientX: 400, clientY: 300, cancelable: true }));
+const zoomed = byId("picture").style.transform;
+press("2");
+const kept = byId("picture").style.transform === zoomed && !zoomed.includes("scale(1)");
+press("0");
+const whole = byId("picture").style.transform;
+document.documentElement.dataset.seen =
+  [...seen, image_is_right, error_is_right, kept, whole].join("|");
+</script>)script");
+  std::ofstream(folder() / "flipped.html") << page;
+  const std::string dom = dom_of(*browser, folder() / "flipped.html");
+  const std::string head = dom.substr(0, dom.find("<head>"));
+  EXPECT_FALSE(contains(head, "data-error")) << head;
+  EXPECT_TRUE(contains(head,
+                       "data-seen=\"path|reference|path|reference|path|bdpt|bdpt|bdpt|"
+                       "bdpt: relative error|path: relative error|reference|reference|path|path|"
+                       "true|true|true|translate(0px, 0px) scale(1)\""))
+      << head;
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <set>
@@ -22,17 +22,17 @@
 #include "cli/text_file.h"
 #include "driftlight/error.h"
 #include "driftlight/image.h"
+#include "driftlight/running_mean.h"
 #include "driftlight/scalar.h"
 #include "driftlight/scene_file.h"
 #include "pending_folder.h"
-#include "run_figures.h"
 
 namespace driftlight::cli {
 
 namespace {
 
-/// Brightness of a shown image in the middle.
-constexpr double kMiddleGrey = 0.18;
+/// Least mean luminance of a shown image.
+constexpr double kShownMean = 0.12;
 
 /// Throws InputError if it cannot be read or is not of the scene's size.
 std::optional<Image> read_reference(const CompareCommand& command,
@@ -61,16 +61,20 @@ void take_depths(const LoadedScene& loaded, std::vector<Contender>& contenders) 
     if (!notice.empty()) print_notice(notice);
 }
 
-/// A power of two that brings the median of what is lit near middle grey.
+/// The least power of two at which the shown luminance, at most 1 in a pixel, is bright enough in
+/// the mean; 1 for a black image. Lamps and dark corners do not decide it.
 double exposure_for(const Image& image) {
-  std::vector<double> lit;
-  for (std::size_t i = 0; i < image.rgb.size(); i += 3) {
-    const double y =
-        luminance(Rgbd(static_cast<double>(image.rgb[i]), static_cast<double>(image.rgb[i + 1]),
-                       static_cast<double>(image.rgb[i + 2])));
-    if (y > 0.0 && std::isfinite(y)) lit.push_back(y);
+  for (double exposure = 0x1p-20; exposure <= 0x1p20; exposure *= 2.0) {
+    RunningMean shown;
+    for (std::size_t i = 0; i < image.rgb.size(); i += 3) {
+      const double y =
+          luminance(Rgbd(static_cast<double>(image.rgb[i]), static_cast<double>(image.rgb[i + 1]),
+                         static_cast<double>(image.rgb[i + 2])));
+      shown.add(y > 0.0 ? std::min(exposure * y, 1.0) : 0.0);
+    }
+    if (shown.mean() >= kShownMean) return exposure;
   }
-  return lit.empty() ? 1.0 : std::exp2(std::round(std::log2(kMiddleGrey / median(std::move(lit)))));
+  return 1.0;
 }
 
 void write_exposed(const std::filesystem::path& file, Image image, double exposure) {

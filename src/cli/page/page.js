@@ -38,6 +38,10 @@ function number(x) {
   return size >= 1000 ? Math.round(x).toString() : x.toPrecision(3);
 }
 
+function probability(p) {
+  return p < 1e-3 ? p.toExponential(0) : p.toPrecision(2);
+}
+
 // --- Heading -------------------------------------------------------------------------------------
 
 function budgetText() {
@@ -339,12 +343,12 @@ function brightnessText({ brightness }) {
 }
 
 function ratioText({ brightness }) {
-  return { text: `${brightness.ratio.toFixed(4)} (p ${brightness.p_value.toPrecision(2)})`,
+  return { text: `${brightness.ratio.toFixed(4)} (p ${probability(brightness.p_value)})`,
            doubt: brightness.p_value < kDoubt };
 }
 
 function tilesText({ tile_test: test }) {
-  return { text: `${test.rejected} of ${test.tiles} (p ${test.p_value.toPrecision(2)})`,
+  return { text: `${test.rejected} of ${test.tiles} (p ${probability(test.p_value)})`,
            doubt: test.rejected > 0 };
 }
 
