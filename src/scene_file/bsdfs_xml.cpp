@@ -64,9 +64,11 @@ Bsdf read_diffuse(Properties& properties, LoadContext& context) {
       properties, context, long_name ? "diffuseReflectance" : "reflectance", Rgbd::Constant(0.5))};
 }
 
-/// eta and k of a metal: by name, where given by value, over the index outside.
+/// eta and k of a metal: by name, where given by value, over the index outside. Without a name
+/// Mitsuba 0.6 takes copper, Mitsuba 3 what reflects everything.
 void read_metal(Properties& properties, LoadContext& context, Rgbd& eta, Rgbd& k) {
-  const std::string name = properties.text("material").value_or("Cu");
+  const std::string name = properties.text("material")
+                               .value_or(properties.dialect() == Dialect::Mitsuba3 ? "none" : "Cu");
   eta = Rgbd::Zero();
   k = Rgbd::Ones();
   if (lower_case(name) != "none") {
@@ -181,8 +183,12 @@ bool has_bitmap(const Bsdf& bsdf) {
 }  // namespace
 
 std::shared_ptr<Surface> read_surface(const Element& element, LoadContext& context) {
-  if (element.tag() == "ref")
+  if (element.tag() == "ref") {
+    context.objects.read_ahead(element, "bsdf",
+                               [&](const Element& target) { read_surface(target, context); });
     return context.objects.resolve<std::shared_ptr<Surface>>(element, "bsdf");
+  }
+  if (const auto* read = context.objects.find_read<std::shared_ptr<Surface>>(element)) return *read;
   Properties properties(element);
   auto surface = std::make_shared<Surface>(find_plugin(kBsdfs, properties)(properties, context));
   properties.finish();

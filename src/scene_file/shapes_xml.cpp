@@ -68,8 +68,7 @@ std::vector<Geometry> read_cube(Properties& properties, LoadContext&, const Atta
   return {mesh};
 }
 
-/// The scale of toWorld applies to the radius, but not to `center`: Mitsuba's order is center,
-/// rotation, translation.
+/// In Mitsuba 0.6 the scale of toWorld applies to the radius, but not to `center`.
 std::vector<Geometry> read_sphere(Properties& properties, LoadContext&, const Attachments&) {
   const Eigen::Affine3d to_world = properties.transform("toWorld");
   const double factor = std::cbrt(std::abs(to_world.linear().determinant()));
@@ -78,7 +77,8 @@ std::vector<Geometry> read_sphere(Properties& properties, LoadContext&, const At
     properties.fail("toWorld", "a sphere must be scaled evenly");
   Sphere sphere;
   const Vec3d center = properties.point("center").value_or(Vec3d::Zero());
-  sphere.center = rotation * center + to_world.translation();
+  const bool scales_center = properties.dialect() == Dialect::Mitsuba3;
+  sphere.center = (scales_center ? factor : 1.0) * rotation * center + to_world.translation();
   sphere.radius = factor * properties.positive("radius", 1.0);
   sphere.to_local = rotation.inverse();
   sphere.flip_normals = properties.boolean("flipNormals", false);
@@ -110,15 +110,18 @@ void finish_mesh(Properties& properties, TriangleMesh& mesh) {
   finish_normals(mesh, face_normals, properties.boolean("flipNormals", false));
 }
 
-std::vector<Geometry> read_obj_shape(Properties& properties, LoadContext& context,
+std::vector<Geometry> read_obj_shape(Properties& properties, LoadContext&,
                                      const Attachments& attachments) {
   const std::string name = properties.required_text("filename");
-  const ObjOptions options{.one_mesh = properties.boolean("collapse", false),
+  // Mitsuba 3 knows neither groups nor materials of obj files.
+  const bool plain = properties.dialect() == Dialect::Mitsuba3;
+  const ObjOptions options{.one_mesh = plain || properties.boolean("collapse", false),
                            .flip_tex_coords = properties.boolean("flipTexCoords", true)};
-  const bool load_materials = properties.boolean("loadMaterials", true);
+  const bool load_materials = !plain && properties.boolean("loadMaterials", true);
   const Eigen::Affine3d to_world = properties.transform("toWorld");
-  ObjFile file = with_location(properties.element(),
-                               [&] { return read_obj(context.directory / name, options); });
+  ObjFile file = with_location(properties.element(), [&] {
+    return read_obj(properties.element().find_file(name), options);
+  });
   if (file.names_materials && load_materials && !attachments.surface)
     properties.element().fail("'" + name +
                               "' names materials of an .mtl file, which is not read; "
@@ -136,13 +139,14 @@ std::vector<Geometry> read_obj_shape(Properties& properties, LoadContext& contex
   return result;
 }
 
-std::vector<Geometry> read_serialized_shape(Properties& properties, LoadContext& context,
+std::vector<Geometry> read_serialized_shape(Properties& properties, LoadContext&,
                                             const Attachments&) {
   const std::string name = properties.required_text("filename");
   const int index = properties.integer("shapeIndex", 0);
   const Eigen::Affine3d to_world = properties.transform("toWorld");
-  TriangleMesh mesh = with_location(
-      properties.element(), [&] { return read_serialized(context.directory / name, index); });
+  TriangleMesh mesh = with_location(properties.element(), [&] {
+    return read_serialized(properties.element().find_file(name), index);
+  });
   transform_mesh(mesh, to_world);
   // Unlike for obj files, Mitsuba keeps the outside outside when this format is mirrored.
   if (to_world.linear().determinant() < 0.0) reverse_winding(mesh);
@@ -164,7 +168,8 @@ Attachments read_attachments(Properties& properties, LoadContext& context) {
   Attachments result;
   for (const Element& element : properties.nested({"bsdf", "ref"})) {
     if (result.surface) element.fail("a second bsdf of the shape");
-    if (properties.type() == "obj" && element.find("name"))
+    const bool by_material = properties.type() == "obj" && element.find("name");
+    if (by_material && element.dialect() == Dialect::Mitsuba06)
       element.fail("bsdfs for single materials of an obj file are not supported");
     result.surface = read_surface(element, context);
   }

@@ -24,7 +24,7 @@ Texture read_bitmap_texture(Properties& properties, LoadContext& context) {
   const std::string file = properties.required_text("filename");
   const std::optional<Gamma> gamma = read_gamma(properties);
   texture.bitmap = with_location(properties.element(), [&] {
-    return std::make_shared<const Bitmap>(read_bitmap(context.directory / file, gamma));
+    return std::make_shared<const Bitmap>(read_bitmap(properties.element().find_file(file), gamma));
   });
   const double both = properties.number("uvscale", 1.0);
   texture.uv_scale = {properties.number("uscale", both), properties.number("vscale", both)};
@@ -49,6 +49,7 @@ std::optional<Gamma> read_gamma(Properties& properties) {
 }
 
 Texture read_texture(const Element& element, LoadContext& context) {
+  if (const auto* read = context.objects.find_read<Texture>(element)) return *read;
   Properties properties(element);
   Texture texture = find_plugin(kTextures, properties)(properties, context);
   properties.finish();
@@ -60,7 +61,11 @@ Texture read_textured(Properties& properties, std::string_view name, const Rgbd&
                       LoadContext& context) {
   const auto child = properties.find(name);
   if (child && child->tag() == "texture") return read_texture(*child, context);
-  if (child && child->tag() == "ref") return context.objects.resolve<Texture>(*child, "texture");
+  if (child && child->tag() == "ref") {
+    context.objects.read_ahead(*child, "texture",
+                               [&](const Element& target) { read_texture(target, context); });
+    return context.objects.resolve<Texture>(*child, "texture");
+  }
   return Texture(properties.color(name, fallback));
 }
 
