@@ -45,8 +45,8 @@ std::string list(const Counts<N>& counts, const std::array<std::string_view, N>&
 }
 
 std::string list_shapes(std::span<const Shape> shapes) {
-  constexpr std::array<std::string_view, 3> kNames{"mesh", "sphere", "disk"};
-  Counts<3> counts{};
+  constexpr std::array<std::string_view, 4> kNames{"mesh", "sphere", "disk", "cylinder"};
+  Counts<4> counts{};
   std::size_t triangles = 0;
   for (const Shape& shape : shapes) {
     ++counts.at(shape.geometry.index());

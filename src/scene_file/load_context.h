@@ -25,13 +25,24 @@ struct Surface {
   std::optional<std::uint32_t> material;
 };
 
+/// What a <shape type="shapegroup"> stands for, in its own space.
+struct ShapeGroup {
+  struct Part {
+    Geometry geometry;
+    std::shared_ptr<Surface> surface;
+  };
+  std::vector<Part> parts;
+  std::size_t triangles = 0;
+};
+
 /// Elements by id, for <ref>. In the older dialect only those above a <ref> are known to it, as in
 /// Mitsuba; in the newer one a bsdf or texture further down is read when it is needed.
 class NamedObjects {
  public:
   /// Something with an id that no <ref> may ask for.
   struct Other {};
-  using Object = std::variant<Other, std::shared_ptr<Surface>, Texture>;
+  using Object =
+      std::variant<Other, std::shared_ptr<Surface>, std::shared_ptr<const ShapeGroup>, Texture>;
 
   /// Registers the element if it has an id. Throws SceneError if the id is taken.
   void define(const Element& element, Object object);
@@ -44,6 +55,11 @@ class NamedObjects {
     const auto found = objects_.find(element.find("id").value_or(""));
     if (found == objects_.end() || !(found->second.element == element)) return nullptr;
     return std::get_if<T>(&found->second.object);
+  }
+
+  bool is_read(const Element& element) const {
+    const auto found = objects_.find(element.find("id").value_or(""));
+    return found != objects_.end() && found->second.element == element;
   }
 
   /// Reads the element that the <ref> names before its turn, by `read`, if it has the tag and the
@@ -85,9 +101,16 @@ struct LoadContext {
   SceneBuilder builder;
   NamedObjects objects;
   std::vector<std::string> notices;
+  std::size_t shape_count = 0;
+  std::size_t instanced_triangles = 0;
 
+  /// Of very many notices only the first are kept.
   void notice(const Element& element, const std::string& message) {
-    notices.push_back(to_string(element.location()) + ": " + message);
+    constexpr std::size_t kMaximumNotices = 200;
+    if (notices.size() < kMaximumNotices)
+      notices.push_back(to_string(element.location()) + ": " + message);
+    else if (notices.size() == kMaximumNotices)
+      notices.emplace_back("further notices are left out");
   }
 };
 

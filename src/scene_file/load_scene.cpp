@@ -16,6 +16,9 @@
 namespace driftlight {
 namespace {
 
+/// Files that include others several times each could go on for ever.
+constexpr std::size_t kMaximumIncludes = 1000;
+
 /// Elements that Mitsuba knows but we do not: they would change the picture.
 constexpr std::array kUnsupported{"subsurface", "medium",  "volume",   "phase", "animation",
                                   "film",       "sampler", "rfilter",  "ref",   "boolean",
@@ -40,7 +43,7 @@ class SceneLoader {
     const Element root = read_file(file_);
     context_.surroundings.substitutions.check_defines_used(file_);
     if (!has_sensor_) root.fail("the scene has no sensor");
-    if (!has_shape_) root.fail("the scene has no shape");
+    if (context_.shape_count == 0) root.fail("the scene has no shape");
     if (!has_emitter_) root.fail("the scene has no emitter");
     Scene scene = with_location(root, [&] { return context_.builder.build(); });
     return {std::move(scene), max_depth_, std::move(context_.notices)};
@@ -91,7 +94,6 @@ class SceneLoader {
       has_emitter_ = true;
     } else if (tag == "shape") {
       read_shape(element, context_);
-      has_shape_ = true;
       has_emitter_ |= contains(element, "emitter");
     } else {
       read_other(element);
@@ -115,6 +117,8 @@ class SceneLoader {
       return std::filesystem::equivalent(file, other);
     });
     if (cyclic) element.fail("cyclic include: '" + file.string() + "' includes itself");
+    if (documents_.size() > kMaximumIncludes)
+      element.fail("more than " + std::to_string(kMaximumIncludes) + " files are included");
     read_file(file);
   }
 
@@ -179,7 +183,6 @@ class SceneLoader {
   LoadContext context_;
   std::optional<int> max_depth_;
   bool has_sensor_ = false;
-  bool has_shape_ = false;
   bool has_emitter_ = false;
 };
 
