@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// The dialect of Mitsuba 3, and what both dialects name: ids, files and substitutes.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -320,6 +321,37 @@ TEST(Substitutes, NestedIntegratorsGiveTheirDepth) {
   EXPECT_EQ(loaded.max_depth, 6);
   ASSERT_EQ(loaded.notices.size(), 1U);
   expect_contains(loaded.notices[0], "integrator 'aov' is not driftlight's; only its max_depth");
+}
+
+// --- What grows ----------------------------------------------------------------------------------
+
+TEST(Growth, OfTextIsBounded) {
+  std::string body = R"(<default name="a0" value="xxxxxxxx"/>)";
+  for (int i = 1; i < 40; ++i)
+    body += fmt::format(R"(<default name="a{}" value="$a{}$a{}"/>)", i, i - 1, i - 1);
+  expect_contains(error_of(complete(body)), "longer than 65536 characters");
+}
+
+TEST(Growth, OfIncludesIsBounded) {
+  const SceneDirectory directory;
+  for (int i = 0; i < 12; ++i) {
+    const std::string include = fmt::format(R"(<include filename="part{}.xml"/>)", i + 1);
+    directory.write(fmt::format("part{}.xml", i), test::scene_file(include + include));
+  }
+  directory.write("part12.xml", test::scene_file(""));
+  try {
+    directory.load(complete(R"(<include filename="part0.xml"/>)"));
+    FAIL() << "included 8191 files";
+  } catch (const SceneError& error) {
+    expect_contains(error.what(), "more than 1000 files");
+  }
+}
+
+TEST(Growth, OfNoticesIsBounded) {
+  std::string body;
+  for (int i = 0; i < 300; ++i) body += "<foreign/>";
+  const SceneDirectory directory;
+  EXPECT_EQ(directory.load(complete(body)).notices.size(), 201U);
 }
 
 }  // namespace

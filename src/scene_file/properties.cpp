@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
 
 #include "color_xml.h"
 #include "text.h"
@@ -15,11 +16,10 @@ namespace driftlight {
 Properties::Properties(const Element& element)
     : element_(element), type_(lower_case(element.find("type").value_or(""))) {
   element.allow_attributes({"type", "id", "name"});
+  std::set<std::string> seen;
   for (const Element& child : element.children()) {
     const std::string name = snake_case(child.find("name").value_or(""));
-    const bool seen = !name.empty() && std::any_of(children_.begin(), children_.end(),
-                                                   [&](const Child& c) { return c.name == name; });
-    if (seen)
+    if (!name.empty() && !seen.insert(name).second)
       child.fail(fmt::format("'{}' is given twice in {}", child.text("name"), description()));
     children_.push_back({child, name});
   }

@@ -43,6 +43,7 @@ XmlDocument::XmlDocument(const std::filesystem::path& file)
   if (second && second.type() == pugi::node_element)
     throw SceneError(location(second), "a second outermost element");
   check_depth();
+  collect_ids();
 }
 
 void XmlDocument::check_depth() const {
@@ -72,10 +73,26 @@ SourceLocation XmlDocument::location(std::size_t offset) const {
   return result;
 }
 
+/// Of elements with the same id the first.
+void XmlDocument::collect_ids() {
+  struct Collector : pugi::xml_tree_walker {
+    std::map<std::string, pugi::xml_node>* ids = nullptr;
+
+    bool for_each(pugi::xml_node& node) override {
+      const pugi::xml_attribute id = node.attribute("id");
+      const std::string_view name = node.name();
+      if (id && name != "ref" && name != "alias") ids->emplace(id.value(), node);
+      return true;
+    }
+  };
+  Collector collector;
+  collector.ids = &ids_;
+  document_.traverse(collector);
+}
+
 pugi::xml_node XmlDocument::find_id(const std::string& id) const {
-  return document_.find_node([&](pugi::xml_node node) {
-    return std::string_view(node.name()) != "ref" && id == node.attribute("id").value();
-  });
+  const auto found = ids_.find(id);
+  return found == ids_.end() ? pugi::xml_node() : found->second;
 }
 
 std::optional<std::string> Element::find(const char* attribute) const {

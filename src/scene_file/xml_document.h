@@ -5,6 +5,7 @@
 #include <array>
 #include <filesystem>
 #include <initializer_list>
+#include <map>
 #include <optional>
 #include <pugixml.hpp>
 #include <string>
@@ -40,10 +41,12 @@ class XmlDocument {
   /// Of a byte of the file; columns count characters.
   SourceLocation location(std::size_t offset) const;
   void check_depth() const;
+  void collect_ids();
 
   std::string name_;
   std::string text_;
   pugi::xml_document document_;
+  std::map<std::string, pugi::xml_node> ids_;
   Dialect dialect_ = Dialect::Mitsuba06;
 };
 
