@@ -155,6 +155,7 @@ std::string kind_of(const Bsdf& bsdf) { return std::visit(BsdfKind{}, bsdf); }
 std::string kind_of(const Shape& shape) {
   if (std::holds_alternative<Sphere>(shape.geometry)) return "sphere";
   if (std::holds_alternative<Disk>(shape.geometry)) return "disk";
+  if (std::holds_alternative<Cylinder>(shape.geometry)) return "cylinder";
   return shape.extent.planar ? "planar mesh" : "mesh";
 }
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "bsdf_textures.h"
 #include "driftlight/error.h"
 
 namespace driftlight {
@@ -59,6 +60,24 @@ Roots roots(const Disk& disk, const Vec3d& origin, const Vec3d& direction) {
   const double q = n.cross(disk.u).dot(p) / n2;
   if (!(s * s + q * q <= 1.0)) return {};
   return {1, {t, 0}};
+}
+
+Roots roots(const Cylinder& cylinder, const Vec3d& origin, const Vec3d& direction) {
+  const Vec3d oc = origin - cylinder.base;
+  const Vec3d o = cylinder.across(oc);
+  const Vec3d d = cylinder.across(direction);
+  const double b = o.dot(d) / d.squaredNorm();
+  const double across2 = cylinder.radius * cylinder.radius - (o - b * d).squaredNorm();
+  if (!(across2 >= 0.0 && d.squaredNorm() > 0.0)) return {};
+  const double root = std::sqrt(across2 / d.squaredNorm());
+  Roots found{2, {-b - root, -b + root}};
+  const Vec3d axis = cylinder.axis();
+  for (double& t : found.t) {
+    const double z = axis.dot(oc) + t * axis.dot(direction);
+    // The index of a root names it, so one that is beyond the ends stays, out of every interval.
+    if (!(z >= 0.0 && z <= cylinder.length)) t = -std::numeric_limits<double>::infinity();
+  }
+  return found;
 }
 
 /// First root within the ray's interval, as (index, t).
@@ -129,6 +148,12 @@ Eigen::AlignedBox3d bounds_of(const Sphere& sphere) {
 Eigen::AlignedBox3d bounds_of(const Disk& disk) {
   const Vec3d half = (disk.u.array().square() + disk.v.array().square()).sqrt();
   return {disk.center - half, disk.center + half};
+}
+Eigen::AlignedBox3d bounds_of(const Cylinder& cylinder) {
+  const Vec3d axis = cylinder.axis();
+  const Vec3d half = cylinder.radius * (1.0 - axis.array().square()).max(0.0).sqrt();
+  const Vec3d end = cylinder.base + cylinder.length * axis;
+  return {cylinder.base.cwiseMin(end) - half, cylinder.base.cwiseMax(end) + half};
 }
 
 RTCGeometry embree_geometry(RTCDevice device, const TriangleMesh& mesh) {
@@ -218,6 +243,15 @@ Moments moments(const Disk& disk) {
           0.25 * (disk.u * disk.u.transpose() + disk.v * disk.v.transpose())};
 }
 
+Moments moments(const Cylinder& cylinder) {
+  const Vec3d axis = cylinder.axis();
+  const double across2 = 0.5 * cylinder.radius * cylinder.radius;
+  const double along2 = cylinder.length * cylinder.length / 12.0;
+  return {2.0 * kPi * cylinder.radius * cylinder.length,
+          cylinder.base + 0.5 * cylinder.length * axis,
+          across2 * Eigen::Matrix3d::Identity() + (along2 - across2) * axis * axis.transpose()};
+}
+
 ShapeExtent extent_of(const Geometry& geometry) {
   const Moments m = std::visit([](const auto& shape) { return moments(shape); }, geometry);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(m.covariance);
@@ -243,24 +277,6 @@ DiscreteDistribution triangles_by_area(const TriangleMesh& mesh) {
     areas.push_back(0.5 * (p[1] - p[0]).cross(p[2] - p[0]).norm());
   }
   return DiscreteDistribution(areas);
-}
-
-bool uses_texture(const Bsdf& bsdf) {
-  struct Visitor {
-    bool operator()(const Diffuse& b) const { return !b.reflectance.is_constant(); }
-    bool operator()(const Conductor& b) const { return !b.specular_reflectance.is_constant(); }
-    bool operator()(const RoughConductor& b) const { return !b.specular_reflectance.is_constant(); }
-    bool operator()(const Dielectric& b) const {
-      return !b.specular_reflectance.is_constant() || !b.specular_transmittance.is_constant();
-    }
-    bool operator()(const RoughDielectric& b) const {
-      return !b.specular_reflectance.is_constant() || !b.specular_transmittance.is_constant();
-    }
-    bool operator()(const Phong& b) const {
-      return !b.diffuse_reflectance.is_constant() || !b.specular_reflectance.is_constant();
-    }
-  };
-  return std::visit(Visitor{}, bsdf);
 }
 
 }  // namespace
@@ -318,6 +334,13 @@ EmitterPoint Scene::sample_area(const AreaEmitter& emitter, double u1, double u2
   if (const auto* disk = std::get_if<Disk>(&shape.geometry)) {
     const Vec2d s = square_to_disk(u1, u2);
     return {disk->center + s.x() * disk->u + s.y() * disk->v, disk->u.cross(disk->v).normalized()};
+  }
+  if (const auto* cylinder = std::get_if<Cylinder>(&shape.geometry)) {
+    const double phi = 2.0 * kPi * u2;
+    const Vec3d n = cylinder->to_local.transpose() * Vec3d(std::cos(phi), std::sin(phi), 0.0);
+    const Vec3d p =
+        cylinder->base + u1 * cylinder->length * cylinder->axis() + cylinder->radius * n;
+    return {p, cylinder->flip_normals ? Vec3d(-n) : n};
   }
   const auto& mesh = std::get<TriangleMesh>(shape.geometry);
   const auto i = static_cast<std::uint32_t>(shape.triangles.sample(u1));
@@ -397,6 +420,14 @@ std::uint32_t SceneBuilder::add_shape(Geometry geometry, std::uint32_t material,
                            " is beyond the mesh's " + std::to_string(mesh->positions.size()) +
                            " vertices");
   }
+  if (const auto* cylinder = std::get_if<Cylinder>(&geometry)) {
+    // The extent of one that is thinner or flatter has fewer dimensions than its surface.
+    const double slenderness = cylinder->length / cylinder->radius;
+    if (radiance && !(slenderness > 1e-4 && slenderness < 1e4))
+      throw InputError(
+          "an emitting cylinder must not be more than 10000 times as long as its "
+          "radius, nor the reverse");
+  }
   const auto index = static_cast<std::uint32_t>(scene_.surfaces_->shapes.size());
   Shape shape;
   shape.geometry = std::move(geometry);
@@ -430,8 +461,8 @@ Scene SceneBuilder::build() {
   for (Shape& shape : scene.surfaces_->shapes) {
     shape.extent = extent_of(shape.geometry);
     const Material& material = scene.surfaces_->materials.at(shape.material);
-    shape.textured = uses_texture(scene.surfaces_->bsdfs.at(material.front)) ||
-                     (material.back && uses_texture(scene.surfaces_->bsdfs.at(*material.back)));
+    shape.textured = is_textured(scene.surfaces_->bsdfs.at(material.front)) ||
+                     (material.back && is_textured(scene.surfaces_->bsdfs.at(*material.back)));
     if (shape.emitter)
       if (const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry))
         shape.triangles = triangles_by_area(*mesh);

@@ -45,6 +45,8 @@ Farthest farthest(const Shape& shape) {
   if (const auto* sphere = std::get_if<Sphere>(&shape.geometry)) return {sphere->radius, 3.0};
   if (const auto* disk = std::get_if<Disk>(&shape.geometry))
     return {std::sqrt(disk->u.squaredNorm() + disk->v.squaredNorm()), 4.0};
+  if (const auto* cylinder = std::get_if<Cylinder>(&shape.geometry))
+    return {std::hypot(cylinder->radius, 0.5 * cylinder->length), 5.0};
   Farthest most;
   for (const auto& p : std::get<TriangleMesh>(shape.geometry).positions) {
     const Vec3d offset = p.cast<double>() - shape.extent.centroid;

@@ -27,7 +27,7 @@ const Texture kWhite(Rgbd::Ones());
 Texture bitmap_texture(double low, double high) {
   Texture texture;
   texture.bitmap = pattern_bitmap(8, 8, low, high);
-  texture.uv_scale = {2, 3};
+  texture.uv_to_texture = Vec2d(2, 3).asDiagonal();
   return texture;
 }
 

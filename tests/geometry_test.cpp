@@ -125,6 +125,40 @@ TEST(Interaction, Disk) {
   }
 }
 
+Cylinder oblique_cylinder() {
+  Cylinder cylinder;
+  cylinder.base = {0.3, 1, -0.2};
+  cylinder.to_local = Eigen::AngleAxisd(0.9, Vec3d(1, -2, 3).normalized()).toRotationMatrix();
+  cylinder.length = 1.7;
+  cylinder.radius = 0.6;
+  return cylinder;
+}
+
+// Law: both roots of the cylinder lie on it and on the ray, the first where the ray enters; the
+// normal is radial, flipped if asked; uv are angle and height in the cylinder's own frame.
+TEST(Interaction, Cylinder) {
+  Rng rng(125, Stream::Test, 0);
+  Cylinder cylinder = oblique_cylinder();
+  for (const bool flip : {false, true}) {
+    cylinder.flip_normals = flip;
+    for (int i = 0; i < 500; ++i) {
+      const double phi = 2.0 * kPi * rng.uniform();
+      const double height = cylinder.length * rng.uniform();
+      const Vec3d out = cylinder.to_local.transpose() * Vec3d(std::cos(phi), std::sin(phi), 0.0);
+      const Vec3d p = cylinder.base + height * cylinder.axis() + cylinder.radius * out;
+      const Ray<double> ray = ray_to(p, rng);
+      const std::uint32_t root = ray.direction.dot(out) < 0.0 ? 0 : 1;
+      const Interaction<double> at = interact(Geometry(cylinder), root, ray, true);
+      EXPECT_LT((at.p - p).norm(), 1e-6);
+      EXPECT_LT(distance_from_ray(ray, at.p), 1e-6);
+      EXPECT_LT((at.n_g - (flip ? Vec3d(-out) : out)).norm(), 1e-6);
+      EXPECT_EQ(at.n_s, at.n_g);
+      EXPECT_LT(std::abs(std::remainder(at.uv.x() - phi / (2.0 * kPi), 1.0)), 1e-6);
+      EXPECT_NEAR(at.uv.y(), height / cylinder.length, 1e-6);
+    }
+  }
+}
+
 /// A component of an interaction along a line of rays: f(x) for the origin o + x e.
 template <class Component>
 void check_derivative(const Geometry& geometry, std::uint32_t primitive, const Ray<double>& ray,
@@ -153,7 +187,8 @@ TEST(Interaction, JetsSeeTheSurface) {
   Sphere sphere;
   sphere.radius = 1.3;
   const std::vector<Geometry> shapes{quad({-1, -1, 0}, {2, 0.3, 0}, {0, 2, 1}, true, 0.3), sphere,
-                                     Disk{{0, 0, 0}, {1, 0.2, 0}, {0, 1, 0.5}}};
+                                     Disk{{0, 0, 0}, {1, 0.2, 0}, {0, 1, 0.5}},
+                                     Cylinder{.base = {0, 0, -1}, .length = 2, .radius = 1.1}};
   for (const Geometry& shape : shapes) {
     for (int i = 0; i < 50; ++i) {
       const Ray<double> ray = ray_to(0.5 * random_direction(rng), rng);

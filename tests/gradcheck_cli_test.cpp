@@ -50,6 +50,41 @@ const std::string kScene = R"(<scene version="0.6.0">
 </scene>
 )";
 
+/// Cylinders of several kinds under one that emits, on a floor with a pattern.
+const std::string kPipes = R"(<scene version="3.0.0">
+  <integrator type="path"><integer name="max_depth" value="5"/></integrator>
+  <sensor type="perspective">
+    <float name="fov" value="45"/>
+    <transform name="to_world"><lookat origin="0,2,6" target="0,0.9,0" up="0,1,0"/></transform>
+    <film type="hdrfilm">
+      <integer name="width" value="24"/><integer name="height" value="16"/>
+      <rfilter type="box"/>
+    </film>
+  </sensor>
+  <shape type="rectangle">
+    <transform name="to_world"><scale value="5"/><rotate x="1" angle="-90"/></transform>
+    <bsdf type="diffuse"><texture type="checkerboard" name="reflectance"/></bsdf>
+  </shape>
+  <shape type="cylinder">
+    <point name="p0" value="-1.5, 0, 0"/><point name="p1" value="-1.2, 2, 0"/>
+    <float name="radius" value="0.5"/><bsdf type="twosided"><bsdf type="diffuse"/></bsdf>
+  </shape>
+  <shape type="cylinder">
+    <point name="p0" value="-0.3, 0.5, 1"/><point name="p1" value="1.5, 0.5, 0.3"/>
+    <float name="radius" value="0.4"/><bsdf type="roughconductor"/>
+  </shape>
+  <shape type="cylinder">
+    <point name="p0" value="1.6, 0, 0.9"/><point name="p1" value="1.6, 1.5, 0.9"/>
+    <float name="radius" value="0.35"/><bsdf type="dielectric"/>
+  </shape>
+  <shape type="cylinder">
+    <point name="p0" value="-1.5, 2.8, 0"/><point name="p1" value="1.8, 3, 0"/>
+    <float name="radius" value="0.2"/>
+    <emitter type="area"><rgb name="radiance" value="8, 7, 6"/></emitter>
+  </shape>
+</scene>
+)";
+
 struct Outcome {
   int exit_code;
   std::string out;
@@ -99,6 +134,15 @@ class GradcheckCli : public ::testing::Test {
  private:
   test::SceneDirectory directory_;
 };
+
+// Law: the derivatives of cylinders agree with independent ones, also where they emit.
+TEST_F(GradcheckCli, CylindersPass) {
+  write("pipes.xml", kPipes);
+  const Outcome outcome = run({"gradcheck", "pipes.xml", "--paths", "2000"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.out << outcome.err;
+  for (const char* const found : {"hit cylinder", "on cylinder", "dielectric transmission inside"})
+    EXPECT_TRUE(contains(outcome.out, found)) << found;
+}
 
 TEST_F(GradcheckCli, PrintsATableAndWritesJson) {
   const Outcome outcome = gradcheck({"scene.xml", "--paths", "300", "--json", "check.json"});

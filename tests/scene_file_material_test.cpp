@@ -289,7 +289,7 @@ TEST(TexturesXml, ReadsBitmapsFromTheTopAndUndoesTheirGamma) {
       <float name="uvscale" value="4"/><float name="vscale" value="5"/>
       <float name="uoffset" value="0.5"/>)");
   EXPECT_NEAR(power.bitmap->at(0, 0).x(), std::pow(encoded, 2.2), 1e-6);
-  expect_near(power.uv_scale, Vec2d(4, 5));
+  EXPECT_EQ(power.uv_to_texture, Eigen::Matrix2d(Vec2d(4, 5).asDiagonal()));
   expect_near(power.uv_offset, Vec2d(0.5, 0));
 }
 
@@ -303,7 +303,7 @@ TEST(TexturesXml, FloatImagesAreLinearAndScaledWhenTooBright) {
          </texture></bsdf></shape>)"));
   const Texture& texture = std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance;
   EXPECT_FLOAT_EQ(texture.bitmap->at(0, 0).x(), 0.5F);
-  EXPECT_NEAR(texture.scale, 0.99 / 2.0, 1e-12);
+  EXPECT_NEAR(texture.scale.x(), 0.99 / 2.0, 1e-12);
 }
 
 }  // namespace

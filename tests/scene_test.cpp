@@ -80,7 +80,12 @@ std::vector<Geometry> shapes_at(double magnitude, Rng& rng) {
   sphere.radius = magnitude;
   const Vec3d u = magnitude * random_direction(rng);
   const Vec3d v = magnitude * u.cross(random_direction(rng)).normalized();
-  return {sphere, Disk{center, u, v}, quad(center, u, v), round_mesh(center, magnitude, 16, false)};
+  Cylinder cylinder;
+  cylinder.base = center;
+  cylinder.length = 1.5 * magnitude;
+  cylinder.radius = 0.7 * magnitude;
+  return {sphere, Disk{center, u, v}, quad(center, u, v), round_mesh(center, magnitude, 16, false),
+          cylinder};
 }
 
 // Law: a ray that starts at leave() does not find the surface that it leaves: not at all on the
@@ -90,9 +95,9 @@ TEST(Scene, LeaveKeepsRaysOffTheirOwnSurface) {
   int left = 0;
   for (const double magnitude : {1e-2, 0.1, 1.0, 30.0, 1e3}) {
     for (Geometry& shape : shapes_at(magnitude, rng)) {
-      const bool flat = !std::holds_alternative<Sphere>(shape) &&
-                        (std::holds_alternative<Disk>(shape) ||
-                         std::get<TriangleMesh>(shape).triangles.size() == 2);
+      const auto* mesh = std::get_if<TriangleMesh>(&shape);
+      const bool flat =
+          std::holds_alternative<Disk>(shape) || (mesh != nullptr && mesh->triangles.size() == 2);
       const Scene scene = scene_of(std::move(shape));
       for (int i = 0; i < 1500; ++i) {
         const Vec3d from = scene.center() + 5.0 * magnitude * random_direction(rng);
@@ -191,6 +196,46 @@ TEST(EmitterSampling, UniformByArea) {
   EXPECT_NEAR(sphere.shapes()[0].extent.area, 4.0 * kPi * 0.04, 1e-12);
 }
 
+// Law: points on a cylinder are uniform by height and angle, with the normal of its front.
+TEST(EmitterSampling, CylindersByArea) {
+  Rng rng(138, Stream::Test, 0);
+  Cylinder cylinder;
+  cylinder.base = {1, 2, 3};
+  cylinder.to_local = Eigen::AngleAxisd(1.1, Vec3d(1, 2, -1).normalized()).toRotationMatrix();
+  cylinder.length = 3;
+  cylinder.radius = 0.4;
+  for (const bool flip : {false, true}) {
+    cylinder.flip_normals = flip;
+    const Scene scene = scene_of(cylinder);
+    std::vector<double> heights, turns;
+    for (int i = 0; i < 20000; ++i) {
+      const EmitterPoint y = scene.sample_area(std::get<AreaEmitter>(scene.emitters()[0]),
+                                               rng.uniform(), rng.uniform());
+      const Vec3d local = cylinder.to_local * (y.p - cylinder.base);
+      EXPECT_NEAR(std::hypot(local.x(), local.y()), 0.4, 1e-12);
+      const Vec3d normal = cylinder.to_local * y.n * (flip ? -0.4 : 0.4);
+      EXPECT_LT((normal - Vec3d(local.x(), local.y(), 0.0)).norm(), 1e-12);
+      heights.push_back(local.z() / 3.0);
+      turns.push_back(0.5 + 0.5 * kInvPi * std::atan2(local.y(), local.x()));
+    }
+    EXPECT_GT(chi_square_uniform(heights).p_value, sidak(0.01, 4));
+    EXPECT_GT(chi_square_uniform(turns).p_value, sidak(0.01, 4));
+    EXPECT_NEAR(scene.shapes()[0].extent.area, 2.0 * kPi * 0.4 * 3.0, 1e-12);
+  }
+}
+
+// Law: a cylinder is open at its ends, and seen from both sides.
+TEST(Scene, CylindersAreOpen) {
+  const Scene scene = scene_of(Cylinder{.length = 2, .radius = 0.5});
+  EXPECT_FALSE(scene.intersect({0, 0, -3}, {0, 0, 1}).valid());
+  EXPECT_EQ(scene.intersect({-3, 0, 1}, {1, 0, 0}), (Hit{0, 0}));
+  EXPECT_EQ(scene.intersect({0, 0, 1}, {1, 0, 0}), (Hit{0, 1}));
+  EXPECT_FALSE(scene.intersect({-3, 0, 2.1}, {1, 0, 0}).valid());
+  // Through the opening onto the far wall.
+  EXPECT_EQ(scene.intersect({-2, 0, 4}, Vec3d(2.4, 0, -3).normalized()), (Hit{0, 1}));
+  EXPECT_TRUE(scene.occluded({-3, 0, 1}, {3, 0, 1}));
+}
+
 // Law: a non-planar mesh picks its triangles by area.
 TEST(EmitterSampling, TrianglesByArea) {
   Rng rng(136, Stream::Test, 0);
@@ -217,9 +262,9 @@ TEST(ShapeExtent, WhitensTheCovariance) {
   Sphere ball;
   ball.center = {5, 6, 7};
   ball.radius = 0.1;
-  const std::vector<Geometry> shapes{quad({5, 1, 2}, {0.2, 0.1, 0}, {0, 1, 3}),
-                                     Disk{{1, 2, 3}, {0.5, 0, 0}, {0, 0, 2}}, ball,
-                                     box({4, 4, 4}, {4.1, 5, 7})};
+  const std::vector<Geometry> shapes{
+      quad({5, 1, 2}, {0.2, 0.1, 0}, {0, 1, 3}), Disk{{1, 2, 3}, {0.5, 0, 0}, {0, 0, 2}}, ball,
+      box({4, 4, 4}, {4.1, 5, 7}), Cylinder{.base = {1, 2, 3}, .length = 0.8, .radius = 0.3}};
   for (const Geometry& shape : shapes) {
     const Scene scene = scene_of(shape);
     const ShapeExtent& extent = scene.shapes()[0].extent;
@@ -238,7 +283,7 @@ TEST(ShapeExtent, WhitensTheCovariance) {
       square += (p - extent.centroid).squaredNorm() / count;
     }
     const int rank = extent.planar ? 2 : 3;
-    EXPECT_EQ(extent.planar, !std::holds_alternative<Sphere>(shape) && &shape != &shapes.back());
+    EXPECT_EQ(extent.planar, &shape < &shapes[2]);
     EXPECT_NEAR(covariance.trace(), rank, 0.06);
     EXPECT_NEAR((covariance * covariance).trace(), rank, 0.12);
     EXPECT_LT(mean.norm(), 0.05);

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "../src/scene_file/cie_1931.h"
 
 namespace driftlight {
@@ -26,6 +29,19 @@ TEST(Cie1931, HasItsPublishedValues) {
 
 TEST(Spectrum, EqualEnergyIsMitsubasPink) {
   expect_near(spectrum_to_rgb({{300, 1}, {900, 1}}), {1.2049, 0.9483, 0.9093}, 1e-4);
+}
+
+TEST(Spectrum, DaylightOnWhiteIsWhite) {
+  expect_near(reflectance_to_rgb({{300, 1}, {900, 1}}), {1, 1, 1}, 1e-3);
+}
+
+TEST(Spectrum, BlackBodiesPeakAsWienSays) {
+  const Spectrum spectrum = blackbody(5000.0);
+  const auto brightest = std::max_element(
+      spectrum.begin(), spectrum.end(),
+      [](const SpectrumSample& a, const SpectrumSample& b) { return a.value < b.value; });
+  EXPECT_NEAR(brightest->wavelength, 2.897771955e6 / 5000.0, 0.5);
+  EXPECT_NEAR(brightest->value, 4.0957e-6 * std::pow(5000.0, 5) * 1e-9, 20.0);
 }
 
 TEST(Spectrum, EqualEnergyHasUnitLuminance) {

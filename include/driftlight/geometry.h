@@ -43,7 +43,25 @@ struct Disk {
   Vec3d v{0, 1, 0};
 };
 
-using Geometry = std::variant<TriangleMesh, Sphere, Disk>;
+/// The side of a cylinder, open at both ends, with the normal outward. In its own frame, whose axes
+/// are the rows of `to_local` and whose origin is the centre of one end, it is x^2 + y^2 =
+/// radius^2, 0 <= z <= length. uv = (phi / (2 pi), z / length). Primitives as those of spheres.
+struct Cylinder {
+  Vec3d base{0, 0, 0};
+  Eigen::Matrix3d to_local = Eigen::Matrix3d::Identity();
+  double length = 1;
+  double radius = 1;
+  bool flip_normals = false;
+
+  Vec3d axis() const { return to_local.row(2); }
+  /// The part of a vector that is across the axis.
+  template <Scalar T>
+  Vec3<T> across(const Vec3<T>& d) const {
+    return along(d, T(-dot(axis(), d)), constant<T>(axis()));
+  }
+};
+
+using Geometry = std::variant<TriangleMesh, Sphere, Disk, Cylinder>;
 
 /// Names a primitive of a shape of the scene.
 struct Hit {
@@ -182,6 +200,40 @@ Interaction<T> interact_shape(const Disk& disk, std::uint32_t /*primitive*/, con
     const T q = dot(cv, at.p) - cv.dot(disk.center);
     const T phi = atan2(q, s) * (0.5 * kInvPi);
     at.uv = {sqrt(s * s + q * q), value(phi) < 0.0 ? T(phi + 1.0) : phi};
+  }
+  return at;
+}
+
+/// As the sphere, in the plane across the axis: with o', d' the parts of o - c and d there,
+/// t = -b -+ sqrt((r^2 - |l|^2) / |d'|^2),  b = o'.d' / |d'|^2,  l = o' - b d'.
+template <Scalar T>
+Interaction<T> interact_shape(const Cylinder& cylinder, std::uint32_t primitive, const Ray<T>& ray,
+                              bool want_uv) {
+  using std::atan2;
+  using std::sqrt;
+  const Vec3<T> oc = {ray.origin.x() - cylinder.base.x(), ray.origin.y() - cylinder.base.y(),
+                      ray.origin.z() - cylinder.base.z()};
+  const Vec3<T> o = cylinder.across(oc);
+  const Vec3<T> d = cylinder.across(ray.direction);
+  const T inverse = 1.0 / dot(d, d);
+  const T b = dot(o, d) * inverse;
+  const Vec3<T> l = along(o, T(-b), d);
+  const T root = sqrt((cylinder.radius * cylinder.radius - dot(l, l)) * inverse);
+  const T t = primitive == 0 ? T(-b - root) : T(root - b);
+  const Vec3<T> n = normalized(along(o, t, d));
+  const Vec3d axis = cylinder.axis();
+  const T z = dot(axis, oc) + t * dot(axis, ray.direction);
+  const Vec3<T> on_axis = along(constant<T>(cylinder.base), z, constant<T>(axis));
+  Interaction<T> at;
+  at.p = along(on_axis, constant<T>(cylinder.radius), n);
+  at.n_g = cylinder.flip_normals ? Vec3<T>(-n) : n;
+  at.n_s = at.n_g;
+  at.uv = constant<T>(Vec2d(0, 0));
+  if (want_uv) {
+    const Vec3d x = cylinder.to_local.row(0);
+    const Vec3d y = cylinder.to_local.row(1);
+    const T phi = atan2(dot(y, n), dot(x, n)) * (0.5 * kInvPi);
+    at.uv = {value(phi) < 0.0 ? T(phi + 1.0) : phi, z * (1.0 / cylinder.length)};
   }
   return at;
 }

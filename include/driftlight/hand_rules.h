@@ -69,8 +69,10 @@ struct FactorPartials {
 
 /// The differential of a surface about a point, for tangent dx: of the shading normal, and of uv.
 struct SurfaceDifferential {
-  /// dn = curvature dx + a1 (c1.dx) + a2 (c2.dx); the last two only if `interpolated`.
+  /// dn = curvature (dx - straight (straight.dx)) + a1 (c1.dx) + a2 (c2.dx); the last two only if
+  /// `interpolated`.
   double curvature = 0;
+  Vec3d straight{0, 0, 0};  ///< unit direction in which a curved surface is not; zero if none
   bool interpolated = false;
   Vec3d a1, a2, c1, c2;
   /// du = u.dx, dv = v.dx; only if `textured`.
@@ -78,7 +80,7 @@ struct SurfaceDifferential {
   Vec3d u, v;
 
   Vec3d normal_adjoint(const Vec3d& n_bar) const {
-    Vec3d x_bar = curvature * n_bar;
+    Vec3d x_bar = curvature * (n_bar - straight.dot(n_bar) * straight);
     if (interpolated) x_bar += a1.dot(n_bar) * c1 + a2.dot(n_bar) * c2;
     return x_bar;
   }
@@ -327,9 +329,17 @@ struct HandRules {
   // ---- Geometry ----
 
   /// n.v of (H14). On a sphere |n.v| = sqrt(R^2 - |l|^2) / R, l = o - c - b v, b = (o - c).v, as in
-  /// geometry.h: near the silhouette n itself is too coarse.
+  /// geometry.h: near the silhouette n itself is too coarse. On a cylinder the same in the plane
+  /// across its axis, times |v'|.
   static double hit_cosine(const Geometry& geometry, const Vec3d& origin, const Vec3d& v,
                            const Vec3d& n) {
+    if (const auto* cylinder = std::get_if<Cylinder>(&geometry)) {
+      const Vec3d o = cylinder->across(Vec3d(origin - cylinder->base));
+      const Vec3d d = cylinder->across(v);
+      const Vec3d l = along(o, -dot(o, d) / dot(d, d), d);
+      const double root = std::sqrt((cylinder->radius * cylinder->radius - dot(l, l)) * dot(d, d));
+      return std::copysign(root / cylinder->radius, n.dot(v));
+    }
     const auto* sphere = std::get_if<Sphere>(&geometry);
     if (sphere == nullptr) return n.dot(v);
     const Vec3d oc = origin - sphere->center;
@@ -398,6 +408,23 @@ struct HandRules {
       result.textured = true;
       result.u = 0.5 * kInvPi / (sphere.radius * (cx * cx + cy * cy)) * (cx * y - cy * x);
       result.v = -kInvPi / (sphere.radius * std::sqrt(1.0 - cz * cz)) * z;
+    }
+    return result;
+  }
+
+  /// (H16) across the axis; u = atan2(Y, X) / (2 pi) of the outward normal, v = Z / length.
+  static SurfaceDifferential surface(const Cylinder& cylinder, std::uint32_t, const Vec3d& p,
+                                     const Vec3d& n_s, bool textured) {
+    SurfaceDifferential result;
+    const Vec3d out = cylinder.across(Vec3d(p - cylinder.base)) / cylinder.radius;
+    result.curvature = std::copysign(1.0 / cylinder.radius, out.dot(n_s));
+    result.straight = cylinder.axis();
+    if (textured) {
+      const Vec3d x = cylinder.to_local.row(0);
+      const Vec3d y = cylinder.to_local.row(1);
+      result.textured = true;
+      result.u = 0.5 * kInvPi / cylinder.radius * (x.dot(out) * y - y.dot(out) * x);
+      result.v = 1.0 / cylinder.length * cylinder.axis();
     }
     return result;
   }

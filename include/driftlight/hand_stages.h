@@ -267,8 +267,10 @@ class StageSweep : RecordedPath<Rules> {
   static Columns normal(const SurfaceDifferential& surface, const Columns& dx) {
     if (surface.interpolated)
       return outer(surface.a1, dot(surface.c1, dx)) + outer(surface.a2, dot(surface.c2, dx));
-    if (surface.curvature != 0.0) return surface.curvature * dx;
-    return Columns::zero();
+    if (surface.curvature == 0.0) return Columns::zero();
+    if (!surface.straight.isZero(0.0))
+      return surface.curvature * (dx - outer(surface.straight, dot(surface.straight, dx)));
+    return surface.curvature * dx;
   }
 
   /// (H12), (H13)
@@ -410,6 +412,8 @@ class StageSweep : RecordedPath<Rules> {
     if (const auto* sphere = std::get_if<Sphere>(&geometry))
       return (p - sphere->center) / sphere->radius;
     if (const auto* disk = std::get_if<Disk>(&geometry)) return disk->u.cross(disk->v).normalized();
+    if (const auto* cylinder = std::get_if<Cylinder>(&geometry))
+      return cylinder->across(Vec3d(p - cylinder->base)) / cylinder->radius;
     return geometric_normal(std::get<TriangleMesh>(geometry), primitive);
   }
 

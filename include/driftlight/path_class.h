@@ -12,7 +12,7 @@ namespace driftlight {
 
 /// "diffuse", "rough conductor ggx", ..
 std::string kind_of(const Bsdf& bsdf);
-/// "planar mesh", "mesh", "sphere", "disk"
+/// "planar mesh", "mesh", "sphere", "disk", "cylinder"
 std::string kind_of(const Shape& shape);
 /// "area emitter", "point emitter", "constant environment", "environment map"
 std::string kind_of(const Emitter& emitter);

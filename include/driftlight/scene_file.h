@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Mitsuba scene files (XML, the 0.5/0.6 dialect).
+/// Mitsuba scene files (XML): the dialects of Mitsuba 0.5 and 0.6, and of Mitsuba 3.
 #pragma once
 
 #include <filesystem>
@@ -23,7 +23,8 @@ struct LoadedScene {
   /// Longest path in edges, from the file's integrator. None: not given or unbounded (-1).
   std::optional<int> max_depth;
   /// Things the user should know, each "file:line:column: ..": an integrator that is not ours, a
-  /// sampler that is not used, and so on. Nothing in it changes the picture.
+  /// sampler that is not used, a filter that is replaced, and so on. Nothing in it changes the
+  /// picture by more than a blur of a pixel or the digits of a table.
   std::vector<std::string> notices;
 };
 

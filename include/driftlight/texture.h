@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Textures: a constant colour or a bilinearly filtered bitmap.
+/// Textures: a constant colour, a bitmap or a pattern of two colours.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "driftlight/scalar.h"
@@ -22,7 +25,32 @@ struct Bitmap {
   }
 };
 
-enum class Wrap { Repeat, Clamp };
+/// What is beyond the edges of a bitmap: itself, its last texels, its mirror image, black or white.
+enum class Wrap { Repeat, Clamp, Mirror, Zero, One };
+
+inline constexpr int kBlackTexel = -1;
+inline constexpr int kWhiteTexel = -2;
+
+/// Index of texel i in a row of n, of which it may be beyond the edges; kBlackTexel or kWhiteTexel
+/// if nothing of the row is there. In double, as an int has no room for coordinates scaled by a
+/// lot.
+inline int wrapped_index(double i, int n, Wrap wrap) {
+  if (wrap == Wrap::Repeat) i -= n * std::floor(i / n);
+  if (wrap == Wrap::Mirror) {
+    i -= 2.0 * n * std::floor(i / (2.0 * n));
+    i = std::min(i, 2.0 * n - 1.0 - i);
+  }
+  const bool outside = !(i >= 0.0 && i < n);
+  if (outside && wrap == Wrap::Zero) return kBlackTexel;
+  if (outside && wrap == Wrap::One) return kWhiteTexel;
+  return static_cast<int>(std::min(std::max(0.0, i), n - 1.0));
+}
+
+/// The texel at two wrapped indices.
+inline Rgbd wrapped_texel(const Bitmap& bitmap, int x, int y) {
+  if (x < 0 || y < 0) return Rgbd::Constant((x < 0 ? x : y) == kWhiteTexel ? 1.0 : 0.0);
+  return bitmap.at(x, y).cast<double>();
+}
 
 /// The bilinear patch between the four texel centres around pixel coordinates (x, y), where texel
 /// (i, j) has its centre at (i + 1/2, j + 1/2):
@@ -33,21 +61,16 @@ struct BilinearPatch {
   double x0, y0;  ///< the first texel centre
 
   BilinearPatch(const Bitmap& bitmap, double x, double y, Wrap wrap_x, Wrap wrap_y) {
-    const auto wrap = [](int i, int n, Wrap mode) {
-      if (mode == Wrap::Clamp) return std::min(std::max(i, 0), n - 1);
-      const int r = i % n;
-      return r < 0 ? r + n : r;
-    };
     const double left_texel = std::floor(x - 0.5);
     const double top_texel = std::floor(y - 0.5);
-    const int left = wrap(static_cast<int>(left_texel), bitmap.width, wrap_x);
-    const int right = wrap(static_cast<int>(left_texel) + 1, bitmap.width, wrap_x);
-    const int top = wrap(static_cast<int>(top_texel), bitmap.height, wrap_y);
-    const int bottom = wrap(static_cast<int>(top_texel) + 1, bitmap.height, wrap_y);
-    c00 = bitmap.at(left, top).cast<double>();
-    c10 = bitmap.at(right, top).cast<double>();
-    c01 = bitmap.at(left, bottom).cast<double>();
-    c11 = bitmap.at(right, bottom).cast<double>();
+    const int left = wrapped_index(left_texel, bitmap.width, wrap_x);
+    const int right = wrapped_index(left_texel + 1.0, bitmap.width, wrap_x);
+    const int top = wrapped_index(top_texel, bitmap.height, wrap_y);
+    const int bottom = wrapped_index(top_texel + 1.0, bitmap.height, wrap_y);
+    c00 = wrapped_texel(bitmap, left, top);
+    c10 = wrapped_texel(bitmap, right, top);
+    c01 = wrapped_texel(bitmap, left, bottom);
+    c11 = wrapped_texel(bitmap, right, bottom);
     x0 = left_texel + 0.5;
     y0 = top_texel + 0.5;
   }
@@ -73,40 +96,82 @@ Rgb<T> lookup(const Bitmap& bitmap, const T& x, const T& y, Wrap wrap_x, Wrap wr
   return result;
 }
 
-/// A colour over the surface. Without a bitmap it is `color`; with one it is the bitmap, repeated,
-/// looked up at uv * uv_scale + uv_offset in units of the whole bitmap.
+/// Two colours in a pattern that repeats with period 1 in both coordinates. Constant between its
+/// edges, at which it jumps.
+struct TwoColors {
+  enum class Layout {
+    Checkerboard,  ///< four squares: color0 where both coordinates are in the same half
+    Grid           ///< lines of color1 around the integers, as wide as `line_width` on either side
+  };
+
+  Layout layout = Layout::Checkerboard;
+  Rgbd color0{0.4, 0.4, 0.4};
+  Rgbd color1{0.2, 0.2, 0.2};
+  double line_width = 0;
+
+  const Rgbd& at(const Vec2d& p) const {
+    const Vec2d in_period = p.array() - p.array().floor();
+    if (layout == Layout::Checkerboard)
+      return (in_period.x() < 0.5) == (in_period.y() < 0.5) ? color0 : color1;
+    const Vec2d to_line = in_period.array().min(1.0 - in_period.array());
+    return to_line.minCoeff() < line_width ? color1 : color0;
+  }
+  /// The share of color1.
+  double share1() const {
+    const double between = 1.0 - 2.0 * std::min(line_width, 0.5);
+    return layout == Layout::Checkerboard ? 0.5 : 1.0 - between * between;
+  }
+};
+
+/// A colour over the surface: the bitmap or the pattern if there is one, else `color`. Bitmap and
+/// pattern are looked up at uv_to_texture * uv + uv_offset, a bitmap in units of its whole.
 struct Texture {
   Rgbd color{0.5, 0.5, 0.5};
   std::shared_ptr<const Bitmap> bitmap;
-  Vec2d uv_scale{1, 1};
+  std::optional<TwoColors> pattern;
+  Eigen::Matrix2d uv_to_texture = Eigen::Matrix2d::Identity();
   Vec2d uv_offset{0, 0};
-  /// Factor on the bitmap (energy conservation of BSDFs scales their textures).
-  double scale = 1;
+  Wrap wrap_u = Wrap::Repeat;  ///< of the bitmap
+  Wrap wrap_v = Wrap::Repeat;
+  bool interpolates = true;  ///< bilinearly between texels; else a texel is a square of its colour
+  /// Factor on bitmap or pattern (energy conservation of BSDFs scales their textures).
+  Rgbd scale{1, 1, 1};
 
   Texture() = default;
   explicit Texture(const Rgbd& constant_color) : color(constant_color) {}
 
-  bool is_constant() const { return bitmap == nullptr; }
+  bool is_constant() const { return bitmap == nullptr && !pattern; }
   /// Derivatives of `eval` by u and by v.
   struct Slopes {
     Rgbd u, v;
   };
   Slopes slopes(const Vec2d& uv) const;
 
-  /// Largest component that the texture takes anywhere.
-  double maximum() const;
-  /// Mean colour (over the bitmap).
+  /// Largest value of each component that the texture takes anywhere.
+  Rgbd maximum_color() const;
+  double maximum() const { return maximum_color().maxCoeff(); }
+  /// Mean colour (over bitmap or pattern).
   Rgbd average() const;
 
   template <Scalar T>
   Rgb<T> eval(const Vec2<T>& uv) const {
     if (is_constant()) return constant<T>(color);
-    const T x = (uv.x() * uv_scale.x() + uv_offset.x()) * static_cast<double>(bitmap->width);
-    const T y = (uv.y() * uv_scale.y() + uv_offset.y()) * static_cast<double>(bitmap->height);
-    Rgb<T> c = lookup(*bitmap, x, y, Wrap::Repeat, Wrap::Repeat);
-    for (int i = 0; i < 3; ++i) c[i] = c[i] * scale;
+    // Patterns and single texels are constant but for jumps.
+    if (pattern || !interpolates) return constant<T>(steps({value(uv.x()), value(uv.y())}));
+    const double width = bitmap->width;
+    const double height = bitmap->height;
+    const Eigen::Matrix2d& m = uv_to_texture;
+    const T x = (uv.x() * m(0, 0) + uv.y() * m(0, 1) + uv_offset.x()) * width;
+    const T y = (uv.x() * m(1, 0) + uv.y() * m(1, 1) + uv_offset.y()) * height;
+    Rgb<T> c = lookup(*bitmap, x, y, wrap_u, wrap_v);
+    for (int i = 0; i < 3; ++i) c[i] = c[i] * scale[i];
     return c;
   }
+
+ private:
+  Vec2d place(const Vec2d& uv) const { return uv_to_texture * uv + uv_offset; }
+  /// The colour of the pattern, or of the nearest texel.
+  Rgbd steps(const Vec2d& uv) const;
 };
 
 }  // namespace driftlight

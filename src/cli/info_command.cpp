@@ -3,13 +3,16 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
 
+#include "bsdf_textures.h"
 #include "cli/commands.h"
 #include "cli/max_depth.h"
 #include "cli/print.h"
@@ -45,8 +48,8 @@ std::string list(const Counts<N>& counts, const std::array<std::string_view, N>&
 }
 
 std::string list_shapes(std::span<const Shape> shapes) {
-  constexpr std::array<std::string_view, 3> kNames{"mesh", "sphere", "disk"};
-  Counts<3> counts{};
+  constexpr std::array<std::string_view, 4> kNames{"mesh", "sphere", "disk", "cylinder"};
+  Counts<4> counts{};
   std::size_t triangles = 0;
   for (const Shape& shape : shapes) {
     ++counts.at(shape.geometry.index());
@@ -54,6 +57,38 @@ std::string list_shapes(std::span<const Shape> shapes) {
       triangles += mesh->triangles.size();
   }
   return fmt::format("{} ({} triangles)", list(counts, kNames), triangles);
+}
+
+/// "2 bitmap (64 x 64, 1024 x 512), 1 checkerboard"; a bitmap that several materials share is one.
+std::string list_textures(std::span<const Bsdf> bsdfs) {
+  constexpr std::array<std::string_view, 2> kPatterns{"checkerboard", "grid"};
+  Counts<2> patterns{};
+  std::set<const Bitmap*> seen;
+  std::vector<std::string> sizes;
+  const auto add = [&](const Texture& texture) {
+    if (texture.pattern) ++patterns.at(static_cast<std::size_t>(texture.pattern->layout));
+    const Bitmap* const bitmap = texture.bitmap.get();
+    if (bitmap != nullptr && seen.insert(bitmap).second)
+      sizes.push_back(fmt::format("{} x {}", bitmap->width, bitmap->height));
+  };
+  for (const Bsdf& bsdf : bsdfs) for_each_texture(bsdf, add);
+  const std::string others = list(patterns, kPatterns);
+  if (sizes.empty()) return others;
+  const std::string bitmaps = fmt::format("{} bitmap ({})", sizes.size(), fmt::join(sizes, ", "));
+  return others == "none" ? bitmaps : bitmaps + ", " + others;
+}
+
+/// Field of view across the film, and where the camera is.
+std::string describe_camera(const PerspectiveCamera& camera) {
+  const double degrees = 360.0 * kInvPi * std::atan(camera.half_width);
+  return fmt::format("perspective, {:.4g} degrees across, at ({:.4g}, {:.4g}, {:.4g})", degrees,
+                     camera.origin.x(), camera.origin.y(), camera.origin.z());
+}
+
+std::string describe_bounds(const Scene& scene) {
+  const Vec3d& center = scene.center();
+  return fmt::format("sphere of radius {:.4g} around ({:.4g}, {:.4g}, {:.4g})", scene.radius(),
+                     center.x(), center.y(), center.z());
 }
 
 std::string depth_text(const LoadedScene& loaded) {
@@ -93,9 +128,12 @@ void run(const InfoCommand& command) {
   std::string text = row("scene", command.scene.file.string());
   text += row("film",
               fmt::format("{} x {} pixels", scene.camera().film_width, scene.camera().film_height));
+  text += row("camera", describe_camera(scene.camera()));
   text += row("max depth", depth_text(loaded));
+  text += row("bounds", describe_bounds(scene));
   text += row("shapes", list_shapes(scene.shapes()));
   text += row("bsdfs", list(count_kinds(scene.bsdfs()), kBsdfs));
+  text += row("textures", list_textures(scene.bsdfs()));
   text += row("emitters", list(count_kinds(scene.emitters()), kEmitters));
   for (const std::string& notice : loaded.notices) text += row("notice", notice);
   print(text);

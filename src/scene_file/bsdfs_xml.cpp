@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 
+#include "bsdf_textures.h"
 #include "color_xml.h"
 #include "properties.h"
 #include "refractive_indices.h"
@@ -19,10 +20,10 @@ void conserve_energy(Properties& properties, LoadContext& context,
                      std::initializer_list<Texture*> textures) {
   if (!properties.boolean("ensureEnergyConservation", true)) return;
   Rgbd sum = Rgbd::Zero();
-  for (const Texture* texture : textures) sum += maximum_color(*texture);
+  for (const Texture* texture : textures) sum += texture->maximum_color();
   if (sum.maxCoeff() <= 1.0) return;
   const double factor = 0.99 / sum.maxCoeff();
-  for (Texture* texture : textures) scale(*texture, factor);
+  for (Texture* texture : textures) scale(*texture, Rgbd::Constant(factor));
   context.notice(properties.element(), "the reflectance of " + properties.description() +
                                            " exceeds 1 and is scaled by " + std::to_string(factor) +
                                            ", as in Mitsuba");
@@ -64,9 +65,11 @@ Bsdf read_diffuse(Properties& properties, LoadContext& context) {
       properties, context, long_name ? "diffuseReflectance" : "reflectance", Rgbd::Constant(0.5))};
 }
 
-/// eta and k of a metal: by name, where given by value, over the index outside.
+/// eta and k of a metal: by name, where given by value, over the index outside. Without a name
+/// Mitsuba 0.6 takes copper, Mitsuba 3 what reflects everything.
 void read_metal(Properties& properties, LoadContext& context, Rgbd& eta, Rgbd& k) {
-  const std::string name = properties.text("material").value_or("Cu");
+  const std::string name = properties.text("material")
+                               .value_or(properties.dialect() == Dialect::Mitsuba3 ? "none" : "Cu");
   eta = Rgbd::Zero();
   k = Rgbd::Ones();
   if (lower_case(name) != "none") {
@@ -162,27 +165,15 @@ constexpr std::array<std::pair<std::string_view, BsdfReader>, 7> kBsdfs{{
     {"twosided", &read_two_sided},
 }};
 
-bool has_bitmap(const Diffuse& b) { return !b.reflectance.is_constant(); }
-bool has_bitmap(const Conductor& b) { return !b.specular_reflectance.is_constant(); }
-bool has_bitmap(const RoughConductor& b) { return !b.specular_reflectance.is_constant(); }
-bool has_bitmap(const Phong& b) {
-  return !b.diffuse_reflectance.is_constant() || !b.specular_reflectance.is_constant();
-}
-template <class D>
-bool has_bitmap(const D& dielectric) {
-  return !dielectric.specular_reflectance.is_constant() ||
-         !dielectric.specular_transmittance.is_constant();
-}
-
-bool has_bitmap(const Bsdf& bsdf) {
-  return std::visit([](const auto& b) { return has_bitmap(b); }, bsdf);
-}
-
 }  // namespace
 
 std::shared_ptr<Surface> read_surface(const Element& element, LoadContext& context) {
-  if (element.tag() == "ref")
+  if (element.tag() == "ref") {
+    context.objects.read_ahead(element, "bsdf",
+                               [&](const Element& target) { read_surface(target, context); });
     return context.objects.resolve<std::shared_ptr<Surface>>(element, "bsdf");
+  }
+  if (const auto* read = context.objects.find_read<std::shared_ptr<Surface>>(element)) return *read;
   Properties properties(element);
   auto surface = std::make_shared<Surface>(find_plugin(kBsdfs, properties)(properties, context));
   properties.finish();
@@ -200,7 +191,7 @@ std::uint32_t material_index(Surface& surface, LoadContext& context) {
 }
 
 bool is_textured(const Surface& surface) {
-  return has_bitmap(surface.front) || (surface.back && has_bitmap(*surface.back));
+  return is_textured(surface.front) || (surface.back && is_textured(*surface.back));
 }
 
 }  // namespace driftlight

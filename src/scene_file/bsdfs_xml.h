@@ -14,7 +14,7 @@ std::shared_ptr<Surface> read_surface(const Element& element, LoadContext& conte
 /// The material of the surface, added to the scene when it is first needed.
 std::uint32_t material_index(Surface& surface, LoadContext& context);
 
-/// True if some BSDF of the surface has a bitmap.
+/// True if some BSDF of the surface has a texture that is not one colour.
 bool is_textured(const Surface& surface);
 
 }  // namespace driftlight

@@ -9,8 +9,9 @@ namespace driftlight {
 
 inline const Rgbd kWhite{1, 1, 1};
 
-/// Linear sRGB of <rgb> or <srgb> (one value, three values or #rrggbb) or of <spectrum> (one value,
-/// three values, or a list "wavelength:value, ..", nm). Throws SceneError on negative values.
+/// Linear sRGB of <rgb> or <srgb> (one value, three values or #rrggbb), of <spectrum> (see
+/// spectrum_xml.h), of <blackbody> (`temperature` in kelvin, `scale`), or of <float> (grey). Throws
+/// SceneError on negative values.
 Rgbd read_color(const Element& element);
 
 }  // namespace driftlight

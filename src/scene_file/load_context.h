@@ -4,16 +4,15 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
 #include "driftlight/scene.h"
-#include "substitutions.h"
 #include "xml_document.h"
 
 namespace driftlight {
@@ -26,15 +25,53 @@ struct Surface {
   std::optional<std::uint32_t> material;
 };
 
-/// Elements by id, for <ref>. Only those above a <ref> are known to it, as in Mitsuba.
+/// What a <shape type="shapegroup"> stands for, in its own space.
+struct ShapeGroup {
+  struct Part {
+    Geometry geometry;
+    std::shared_ptr<Surface> surface;
+  };
+  std::vector<Part> parts;
+  std::size_t triangles = 0;
+};
+
+/// Elements by id, for <ref>. In the older dialect only those above a <ref> are known to it, as in
+/// Mitsuba; in the newer one a bsdf or texture further down is read when it is needed.
 class NamedObjects {
  public:
   /// Something with an id that no <ref> may ask for.
   struct Other {};
-  using Object = std::variant<Other, std::shared_ptr<Surface>, Texture>;
+  using Object =
+      std::variant<Other, std::shared_ptr<Surface>, std::shared_ptr<const ShapeGroup>, Texture>;
 
   /// Registers the element if it has an id. Throws SceneError if the id is taken.
   void define(const Element& element, Object object);
+  /// <alias id="..." as="...">: a second id. Throws SceneError.
+  void define_alias(const Element& alias);
+
+  /// What the element stands for if it was read before its turn.
+  template <class T>
+  const T* find_read(const Element& element) const {
+    const auto found = objects_.find(element.find("id").value_or(""));
+    if (found == objects_.end() || !(found->second.element == element)) return nullptr;
+    return std::get_if<T>(&found->second.object);
+  }
+
+  bool is_read(const Element& element) const {
+    const auto found = objects_.find(element.find("id").value_or(""));
+    return found != objects_.end() && found->second.element == element;
+  }
+
+  /// Reads the element that the <ref> names before its turn, by `read`, if it has the tag and the
+  /// dialect allows it. Throws SceneError if elements need each other in a circle.
+  template <class Read>
+  void read_ahead(const Element& ref, std::string_view tag, Read read) {
+    const std::optional<Element> target = find_ahead(ref, tag);
+    if (!target) return;
+    pending_.push_back(*target);
+    read(*target);
+    pending_.pop_back();
+  }
 
   /// The object that <ref id="..."/> names; `kind` ("bsdf") is for messages. Throws SceneError if
   /// there is none, it is of another kind, is defined only further down, or contains the <ref>.
@@ -46,20 +83,34 @@ class NamedObjects {
   }
 
  private:
-  const Object& find(const Element& ref) const;
+  struct Entry {
+    Element element;
+    Object object;
+  };
 
-  std::map<std::string, Object> objects_;
+  const Object& find(const Element& ref) const;
+  std::optional<Element> find_ahead(const Element& ref, std::string_view tag) const;
+  [[noreturn]] void fail_unknown(const Element& element) const;
+
+  std::map<std::string, Entry> objects_;
+  std::vector<Element> pending_;  ///< being read before their turn
 };
 
 struct LoadContext {
-  std::filesystem::path directory;  ///< of the main scene file; other files are relative to it
-  Substitutions substitutions;
+  Surroundings surroundings;
   SceneBuilder builder;
   NamedObjects objects;
   std::vector<std::string> notices;
+  std::size_t shape_count = 0;
+  std::size_t instanced_triangles = 0;
 
+  /// Of very many notices only the first are kept.
   void notice(const Element& element, const std::string& message) {
-    notices.push_back(to_string(element.location()) + ": " + message);
+    constexpr std::size_t kMaximumNotices = 200;
+    if (notices.size() < kMaximumNotices)
+      notices.push_back(to_string(element.location()) + ": " + message);
+    else if (notices.size() == kMaximumNotices)
+      notices.emplace_back("further notices are left out");
   }
 };
 

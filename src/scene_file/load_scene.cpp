@@ -16,23 +16,34 @@
 namespace driftlight {
 namespace {
 
+/// Files that include others several times each could go on for ever.
+constexpr std::size_t kMaximumIncludes = 1000;
+
 /// Elements that Mitsuba knows but we do not: they would change the picture.
-constexpr std::array kUnsupported{"subsurface", "medium", "volume",  "phase",    "alias",
-                                  "animation",  "film",   "sampler", "rfilter",  "ref",
-                                  "boolean",    "float",  "integer", "string",   "rgb",
-                                  "spectrum",   "point",  "vector",  "transform"};
+constexpr std::array kUnsupported{"subsurface", "medium",  "volume",   "phase", "animation",
+                                  "film",       "sampler", "rfilter",  "ref",   "boolean",
+                                  "float",      "integer", "string",   "rgb",   "spectrum",
+                                  "point",      "vector",  "transform"};
+
+/// True if the element contains one with the tag.
+bool contains(const Element& element, std::string_view tag) {
+  const std::vector<Element> children = element.children();
+  return std::any_of(children.begin(), children.end(),
+                     [&](const Element& child) { return child.tag() == tag; });
+}
 
 /// Reads one scene: the elements of its file, from top to bottom, into a SceneBuilder.
 class SceneLoader {
  public:
   SceneLoader(const std::filesystem::path& file, const LoadOptions& options)
-      : file_(file), context_{file.parent_path(), Substitutions(options.defines), {}, {}, {}} {}
+      : file_(file),
+        context_{{Substitutions(options.defines), SearchPath(file.parent_path())}, {}, {}, {}} {}
 
   LoadedScene load() {
     const Element root = read_file(file_);
-    context_.substitutions.check_defines_used(file_);
+    context_.surroundings.substitutions.check_defines_used(file_);
     if (!has_sensor_) root.fail("the scene has no sensor");
-    if (!has_shape_) root.fail("the scene has no shape");
+    if (context_.shape_count == 0) root.fail("the scene has no shape");
     if (!has_emitter_) root.fail("the scene has no emitter");
     Scene scene = with_location(root, [&] { return context_.builder.build(); });
     return {std::move(scene), max_depth_, std::move(context_.notices)};
@@ -43,13 +54,16 @@ class SceneLoader {
   /// outermost element.
   Element read_file(const std::filesystem::path& file) {
     documents_.push_back(std::make_unique<XmlDocument>(file));
-    const XmlDocument& document = *documents_.back();
-    const Element scene(document, document.root(), context_.substitutions);
+    XmlDocument& document = *documents_.back();
+    const Element scene(document, document.root(), context_.surroundings);
     if (scene.tag() != "scene") scene.fail("the outermost element must be <scene>");
     scene.allow_attributes({"version", "id"});
     const std::string version = scene.text("version");
-    if (!version.starts_with("0.5.") && !version.starts_with("0.6."))
-      scene.fail("scene version '" + version + "' is not supported; valid are: 0.5.x, 0.6.x");
+    const std::optional<Dialect> dialect = dialect_of(version);
+    if (!dialect)
+      scene.fail("scene version '" + version +
+                 "' is not supported; valid are: 0.5.x, 0.6.x, 2.x.x, 3.x.x");
+    document.set_dialect(*dialect);
     open_files_.push_back(file);
     for (const Element& element : scene.children()) read(element);
     open_files_.pop_back();
@@ -63,6 +77,10 @@ class SceneLoader {
       read_default(element);
     } else if (tag == "include") {
       read_include(element);
+    } else if (tag == "path") {
+      read_path(element);
+    } else if (tag == "alias") {
+      context_.objects.define_alias(element);
     } else if (tag == "integrator") {
       read_integrator(element);
     } else if (tag == "sensor") {
@@ -76,41 +94,50 @@ class SceneLoader {
       has_emitter_ = true;
     } else if (tag == "shape") {
       read_shape(element, context_);
-      has_shape_ = true;
       has_emitter_ |= contains(element, "emitter");
     } else {
       read_other(element);
     }
   }
 
-  static bool contains(const Element& element, std::string_view tag) {
-    const std::vector<Element> children = element.children();
-    return std::any_of(children.begin(), children.end(),
-                       [&](const Element& child) { return child.tag() == tag; });
-  }
-
   void read_default(const Element& element) {
     element.allow_attributes({"name", "value"});
     const std::string name = element.text("name");
     if (name.empty()) element.fail("<default> needs a name");
-    context_.substitutions.add_default(name, element.text("value"));
+    context_.surroundings.substitutions.add_default(name, element.text("value"));
   }
 
   /// Reads another file as if its elements stood here.
   void read_include(const Element& element) {
     element.allow_attributes({"filename"});
-    const std::filesystem::path file = context_.directory / element.text("filename");
+    const std::filesystem::path file = element.find_file(element.text("filename"));
     if (!std::filesystem::exists(file))
       element.fail("the file '" + file.string() + "' does not exist");
     const bool cyclic = std::any_of(open_files_.begin(), open_files_.end(), [&](const auto& other) {
       return std::filesystem::equivalent(file, other);
     });
     if (cyclic) element.fail("cyclic include: '" + file.string() + "' includes itself");
+    if (documents_.size() > kMaximumIncludes)
+      element.fail("more than " + std::to_string(kMaximumIncludes) + " files are included");
     read_file(file);
   }
 
+  /// A directory in which other files are looked for, too.
+  void read_path(const Element& element) {
+    element.allow_attributes({"value"});
+    const std::filesystem::path directory = element.find_file(element.text("value"));
+    if (!std::filesystem::is_directory(directory))
+      element.fail("the directory '" + directory.string() + "' does not exist");
+    context_.surroundings.search_path.add(directory);
+  }
+
+  /// Mitsuba 3 lets the user choose one of several sensors, by default the first.
   void read_the_sensor(const Element& element) {
-    if (has_sensor_) element.fail("a second sensor");
+    if (has_sensor_) {
+      if (element.dialect() == Dialect::Mitsuba06) element.fail("a second sensor");
+      context_.notice(element, "a further sensor is not used: the first one is");
+      return;
+    }
     context_.builder.set_camera(read_sensor(element, context_));
     has_sensor_ = true;
   }
@@ -118,11 +145,12 @@ class SceneLoader {
   void read_integrator(const Element& element) {
     Properties properties(element);
     if (properties.type() != "langevin" && properties.type() != "path")
-      context_.notice(element,
-                      properties.description() + " is not driftlight's; only its maxDepth is used");
+      context_.notice(element, properties.description() + " is not driftlight's; only its " +
+                                   spelling("maxDepth", element.dialect()) + " is used");
     if (properties.boolean("hideEmitters", false))
       properties.fail("hideEmitters", "hiding emitters is not supported");
     if (const auto depth = properties.find("maxDepth")) set_max_depth(*depth);
+    for (const Element& nested : properties.nested({"integrator"})) read_integrator(nested);
     context_.objects.define(element, NamedObjects::Other{});
   }
 
@@ -134,8 +162,8 @@ class SceneLoader {
         std::find(kUnsupported.begin(), kUnsupported.end(), tag) != kUnsupported.end();
     if (of_mitsuba || element.find("type"))
       element.fail("<" + tag +
-                   "> is not supported in a scene; valid are: default, include, integrator, "
-                   "sensor, bsdf, texture, emitter, shape");
+                   "> is not supported in a scene; valid are: default, include, path, alias, "
+                   "integrator, sensor, bsdf, texture, emitter, shape");
     context_.notice(element, "block <" + tag + "> is not ours; only its maxDepth is used");
     for (const Element& child : element.children())
       if (lower_case(child.find("name").value_or("")) == "maxdepth") set_max_depth(child);
@@ -155,7 +183,6 @@ class SceneLoader {
   LoadContext context_;
   std::optional<int> max_depth_;
   bool has_sensor_ = false;
-  bool has_shape_ = false;
   bool has_emitter_ = false;
 };
 

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "properties.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
+#include <set>
 
 #include "color_xml.h"
 #include "text.h"
@@ -12,11 +16,11 @@ namespace driftlight {
 Properties::Properties(const Element& element)
     : element_(element), type_(lower_case(element.find("type").value_or(""))) {
   element.allow_attributes({"type", "id", "name"});
+  std::set<std::string> seen;
   for (const Element& child : element.children()) {
-    const std::string name = child.find("name").value_or("");
-    const bool seen = !name.empty() && std::any_of(children_.begin(), children_.end(),
-                                                   [&](const Child& c) { return c.name == name; });
-    if (seen) child.fail("'" + name + "' is given twice in " + description());
+    const std::string name = snake_case(child.find("name").value_or(""));
+    if (!name.empty() && !seen.insert(name).second)
+      child.fail(fmt::format("'{}' is given twice in {}", child.text("name"), description()));
     children_.push_back({child, name});
   }
 }
@@ -26,9 +30,11 @@ std::string Properties::description() const {
 }
 
 std::optional<Element> Properties::find(std::string_view name) {
-  if (std::find(names_.begin(), names_.end(), name) == names_.end()) names_.emplace_back(name);
+  const std::string spelt = spelling(name, dialect());
+  if (std::find(names_.begin(), names_.end(), spelt) == names_.end()) names_.push_back(spelt);
+  const std::string snake = snake_case(name);
   for (Child& child : children_) {
-    if (child.name != name) continue;
+    if (child.name != snake) continue;
     child.used = true;
     return child.element;
   }
@@ -39,8 +45,8 @@ std::optional<Element> Properties::find(std::string_view name,
                                         const std::vector<std::string>& tags) {
   const std::optional<Element> child = find(name);
   if (child && std::find(tags.begin(), tags.end(), child->tag()) == tags.end())
-    child->fail("'" + std::string(name) + "' of " + description() + " must be <" + tags.front() +
-                ">, not <" + child->tag() + ">");
+    child->fail(fmt::format("'{}' of {} must be <{}>, not <{}>", child->text("name"), description(),
+                            tags.front(), child->tag()));
   return child;
 }
 
@@ -105,7 +111,7 @@ std::optional<std::string> Properties::text(std::string_view name) {
 
 std::string Properties::required_text(std::string_view name) {
   if (auto value = text(name)) return *std::move(value);
-  element_.fail(description() + " lacks the <string> '" + std::string(name) + "'");
+  element_.fail(description() + " lacks the <string> '" + spelling(name, dialect()) + "'");
 }
 
 std::string Properties::choice(std::string_view name, const std::string& fallback,
@@ -117,7 +123,10 @@ std::string Properties::choice(std::string_view name, const std::string& fallbac
 }
 
 Rgbd Properties::color(std::string_view name, const Rgbd& fallback) {
-  const auto child = find(name, {"rgb", "srgb", "spectrum"});
+  static const std::vector<std::string> kTags{"rgb", "srgb", "spectrum", "blackbody"};
+  static const std::vector<std::string> kTags3{"rgb",       "srgb",  "spectrum",
+                                               "blackbody", "float", "integer"};
+  const auto child = find(name, dialect() == Dialect::Mitsuba3 ? kTags3 : kTags);
   return child ? read_color(*child) : fallback;
 }
 
@@ -129,8 +138,12 @@ std::optional<Vec3d> Properties::vector(std::string_view name) {
 std::optional<Vec3d> Properties::coordinates(std::string_view name, const std::string& tag) {
   const auto child = find(name, {tag});
   if (!child) return std::nullopt;
-  child->allow_attributes({"name", "x", "y", "z"});
-  return Vec3d(child->number("x"), child->number("y"), child->number("z"));
+  if (dialect() == Dialect::Mitsuba3)
+    child->allow_attributes({"name", "x", "y", "z", "value"});
+  else
+    child->allow_attributes({"name", "x", "y", "z"});
+  const std::array<double, 3> xyz = child->xyz();
+  return Vec3d(xyz[0], xyz[1], xyz[2]);
 }
 
 Eigen::Affine3d Properties::transform(std::string_view name) {
@@ -143,14 +156,15 @@ void Properties::finish() const {
     if (child.used) continue;
     if (child.name.empty())
       child.element.fail("<" + child.element.tag() + "> is not supported in " + description());
-    child.element.fail("unknown property '" + child.name + "' of " + description() +
-                       "; valid are: " + (names_.empty() ? "none" : join(names_)));
+    child.element.fail(fmt::format("unknown property '{}' of {}; valid are: {}",
+                                   child.element.text("name"), description(),
+                                   names_.empty() ? "none" : join(names_)));
   }
 }
 
 void Properties::fail(std::string_view name, const std::string& message) {
-  find(name).value_or(element_).fail("'" + std::string(name) + "' of " + description() + ": " +
-                                     message);
+  find(name).value_or(element_).fail("'" + spelling(name, dialect()) + "' of " + description() +
+                                     ": " + message);
 }
 
 }  // namespace driftlight

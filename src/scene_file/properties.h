@@ -16,7 +16,8 @@
 namespace driftlight {
 
 /// The children of an element such as <bsdf type="diffuse">, each to be asked for by its reader.
-/// What nobody asked for is an error in `finish`, which names all that was asked for.
+/// What nobody asked for is an error in `finish`, which names all that was asked for. Readers ask
+/// in camel case ("toWorld"); files of either dialect may also write "to_world".
 class Properties {
  public:
   /// Throws SceneError if two children have the same name.
@@ -31,6 +32,7 @@ class Properties {
   /// The child with this name.
   std::optional<Element> find(std::string_view name);
   bool has(std::string_view name) { return find(name).has_value(); }
+  Dialect dialect() const { return element_.dialect(); }
   /// The children with one of these tags that have not been asked for by name.
   std::vector<Element> nested(std::initializer_list<std::string_view> tags);
   /// Allows properties that have no bearing on the picture.
@@ -62,7 +64,7 @@ class Properties {
  private:
   struct Child {
     Element element;
-    std::string name;
+    std::string name;  ///< in snake case
     bool used = false;
   };
 
@@ -73,7 +75,7 @@ class Properties {
   Element element_;
   std::string type_;
   std::vector<Child> children_;
-  std::vector<std::string> names_;  ///< all that were asked for
+  std::vector<std::string> names_;  ///< all that were asked for, as the dialect spells them
 };
 
 /// The entry of a table of plugins, (name, what to do) pairs, for the type of this one. Throws

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sensor_xml.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -16,16 +18,30 @@ struct FilmSize {
   int height = 576;
 };
 
-void read_filter(Properties& film) {
+/// Films are seen through the box filter here; what another filter would do differently is to blur
+/// the image by a pixel or so.
+void read_filter(Properties& film, LoadContext& context) {
+  constexpr std::string_view kBox = "pixels are means over their squares (filter 'box')";
   const std::vector<Element> filters = film.nested({"rfilter"});
-  if (filters.size() != 1 || lower_case(filters[0].find("type").value_or("")) != "box")
-    (filters.empty() ? film.element() : filters.back())
-        .fail(
-            "only the box filter is supported (Mitsuba's default is another one): write "
-            "<rfilter type=\"box\"/> in the film");
+  if (filters.size() > 1) filters.back().fail("a second rfilter of the film");
+  if (filters.empty()) {
+    context.notice(film.element(),
+                   fmt::format("without an rfilter Mitsuba takes 'gaussian'; here {}", kBox));
+    return;
+  }
   Properties filter(filters[0]);
-  if (filter.number("radius", 0.5) != 0.5) filter.fail("radius", "must be 0.5");
+  constexpr std::array<std::pair<std::string_view, bool>, 6> kFilters{{{"box", true},
+                                                                       {"tent", false},
+                                                                       {"gaussian", false},
+                                                                       {"mitchell", false},
+                                                                       {"catmullrom", false},
+                                                                       {"lanczos", false}}};
+  const bool is_box = find_plugin(kFilters, filter);
+  const bool is_pixel = filter.positive("radius", 0.5) == 0.5;
+  filter.ignore({"stddev", "B", "C", "lobes"});
   filter.finish();
+  if (!is_box || !is_pixel)
+    context.notice(filters[0], fmt::format("{} is not used: {}", filter.description(), kBox));
 }
 
 void reject_crop(Properties& film, const FilmSize& size) {
@@ -57,9 +73,9 @@ FilmSize read_film(const Element& element, LoadContext& context) {
   const bool tone_mapped = find_plugin(kinds, film);
   const FilmSize size = read_size(film);
   reject_crop(film, size);
-  read_filter(film);
+  read_filter(film, context);
   film.ignore({"fileFormat", "pixelFormat", "componentFormat", "channelNames", "banner",
-               "attachLog", "highQualityEdges", "filename"});
+               "attachLog", "highQualityEdges", "filename", "sampleBorder", "compensate"});
   if (tone_mapped) {
     film.ignore({"gamma", "exposure", "tonemapMethod", "key", "burn"});
     context.notice(element, "the tone mapping of ldrfilm is not used: images hold radiance");
@@ -70,8 +86,7 @@ FilmSize read_film(const Element& element, LoadContext& context) {
 
 FilmSize read_film_of(Properties& sensor, LoadContext& context) {
   const std::vector<Element> films = sensor.nested({"film"});
-  if (films.size() != 1)
-    sensor.element().fail("the sensor needs one <film>, with <rfilter type=\"box\"/> in it");
+  if (films.size() != 1) sensor.element().fail("the sensor needs one <film>");
   return read_film(films[0], context);
 }
 
@@ -117,6 +132,20 @@ void place(PerspectiveCamera& camera, Properties& sensor) {
   camera.forward = axes.col(2).normalized();
 }
 
+void reject_shift(Properties& sensor) {
+  for (const std::string_view name : {"principalPointOffsetX", "principalPointOffsetY"})
+    if (sensor.number(name, 0.0) != 0.0) sensor.fail(name, "shifted lenses are not supported");
+}
+
+/// How many samples a pixel gets is up to the command line; says which number the scene asks for.
+void note_sampler(const Element& element, LoadContext& context) {
+  Properties sampler(element);
+  const int count = sampler.integer("sampleCount", 4);
+  context.notice(element, fmt::format("{} is not used; its {} is --spp {} on the command line",
+                                      sampler.description(),
+                                      spelling("sampleCount", element.dialect()), count));
+}
+
 PerspectiveCamera read_perspective(Properties& sensor, LoadContext& context) {
   const FilmSize film = read_film_of(sensor, context);
   const double aspect = static_cast<double>(film.width) / film.height;
@@ -130,11 +159,10 @@ PerspectiveCamera read_perspective(Properties& sensor, LoadContext& context) {
   camera.far_clip = sensor.positive("farClip", 1e4);
   if (!(camera.near_clip < camera.far_clip))
     sensor.fail("nearClip", "must be smaller than 'farClip'");
+  reject_shift(sensor);
   // A pinhole has no focus, and nothing here moves.
   sensor.ignore({"focusDistance", "shutterOpen", "shutterClose"});
-  for (const Element& sampler : sensor.nested({"sampler"}))
-    context.notice(sampler, "sampler '" + sampler.find("type").value_or("") +
-                                "' is not used, nor is its sampleCount");
+  for (const Element& sampler : sensor.nested({"sampler"})) note_sampler(sampler, context);
   return camera;
 }
 

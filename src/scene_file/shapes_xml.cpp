@@ -1,170 +1,46 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "shapes_xml.h"
 
-#include <Eigen/LU>
+#include <fmt/format.h>
+
 #include <array>
-#include <cmath>
+#include <utility>
 
 #include "bsdfs_xml.h"
 #include "emitters_xml.h"
-#include "mesh.h"
-#include "mesh_obj.h"
-#include "mesh_serialized.h"
 #include "properties.h"
+#include "shape_readers.h"
+#include "transform_geometry.h"
 
 namespace driftlight {
 namespace {
 
-/// What a shape carries.
-struct Attachments {
-  std::shared_ptr<Surface> surface;  ///< none if the file gives no bsdf
-  std::optional<Rgbd> radiance;
-};
+/// More triangles than memory holds, in all instances together.
+constexpr std::size_t kMaximumInstanced = std::size_t{1} << 28U;
 
-struct Quad {
-  std::array<Vec3d, 4> corners;  ///< counter-clockwise about the normal
-  std::array<Eigen::Vector2f, 4> uvs;
-};
+/// A file of a few lines can ask for instances without end.
+constexpr std::size_t kMaximumShapes = std::size_t{1} << 22U;
 
-/// Appends the quad as two triangles whose winding follows the normal through mirrorings.
-void append_quad(TriangleMesh& mesh, const Quad& quad, const Eigen::Affine3d& to_world, bool flip) {
-  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-  for (std::size_t i = 0; i < 4; ++i) {
-    mesh.positions.emplace_back((to_world * quad.corners[i]).cast<float>());
-    mesh.uvs.push_back(quad.uvs[i]);
-  }
-  const bool reverse = (to_world.linear().determinant() < 0.0) != flip;
-  const std::uint32_t second = reverse ? first + 3 : first + 1;
-  const std::uint32_t last = reverse ? first + 1 : first + 3;
-  mesh.triangles.push_back({first, second, first + 2});
-  mesh.triangles.push_back({first + 2, last, first});
-}
-
-/// [-1, 1]^2 in the plane z = 0, with normal +z.
-std::vector<Geometry> read_rectangle(Properties& properties, LoadContext&, const Attachments&) {
-  const Quad quad{{Vec3d(-1, -1, 0), Vec3d(1, -1, 0), Vec3d(1, 1, 0), Vec3d(-1, 1, 0)},
-                  {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}}};
-  TriangleMesh mesh;
-  append_quad(mesh, quad, properties.transform("toWorld"),
-              properties.boolean("flipNormals", false));
-  return {mesh};
-}
-
-/// [-1, 1]^3; each face has texture coordinates of its own, laid out as in Mitsuba.
-std::vector<Geometry> read_cube(Properties& properties, LoadContext&, const Attachments&) {
-  const std::array<Eigen::Vector2f, 4> uvs{{{0, 1}, {1, 1}, {1, 0}, {0, 0}}};
-  const std::array<std::array<Vec3d, 4>, 6> faces{{
-      {Vec3d(1, -1, -1), Vec3d(1, -1, 1), Vec3d(-1, -1, 1), Vec3d(-1, -1, -1)},
-      {Vec3d(1, 1, -1), Vec3d(-1, 1, -1), Vec3d(-1, 1, 1), Vec3d(1, 1, 1)},
-      {Vec3d(1, -1, -1), Vec3d(1, 1, -1), Vec3d(1, 1, 1), Vec3d(1, -1, 1)},
-      {Vec3d(1, -1, 1), Vec3d(1, 1, 1), Vec3d(-1, 1, 1), Vec3d(-1, -1, 1)},
-      {Vec3d(-1, -1, 1), Vec3d(-1, 1, 1), Vec3d(-1, 1, -1), Vec3d(-1, -1, -1)},
-      {Vec3d(1, 1, -1), Vec3d(1, -1, -1), Vec3d(-1, -1, -1), Vec3d(-1, 1, -1)},
-  }};
-  const Eigen::Affine3d to_world = properties.transform("toWorld");
-  const bool flip = properties.boolean("flipNormals", false);
-  TriangleMesh mesh;
-  for (const auto& corners : faces) append_quad(mesh, {corners, uvs}, to_world, flip);
-  return {mesh};
-}
-
-/// The scale of toWorld applies to the radius, but not to `center`: Mitsuba's order is center,
-/// rotation, translation.
-std::vector<Geometry> read_sphere(Properties& properties, LoadContext&, const Attachments&) {
-  const Eigen::Affine3d to_world = properties.transform("toWorld");
-  const double factor = std::cbrt(std::abs(to_world.linear().determinant()));
-  const Eigen::Matrix3d rotation = to_world.linear() / factor;
-  if (!(rotation * rotation.transpose()).isIdentity(1e-3))
-    properties.fail("toWorld", "a sphere must be scaled evenly");
-  Sphere sphere;
-  const Vec3d center = properties.point("center").value_or(Vec3d::Zero());
-  sphere.center = rotation * center + to_world.translation();
-  sphere.radius = factor * properties.positive("radius", 1.0);
-  sphere.to_local = rotation.inverse();
-  sphere.flip_normals = properties.boolean("flipNormals", false);
-  return {sphere};
-}
-
-/// The unit disk in the plane z = 0, with normal +z.
-std::vector<Geometry> read_disk(Properties& properties, LoadContext&,
-                                const Attachments& attachments) {
-  const Eigen::Affine3d to_world = properties.transform("toWorld");
-  const bool flip = properties.boolean("flipNormals", false);
-  Disk disk{to_world.translation(), to_world.linear().col(0), to_world.linear().col(1)};
-  if ((to_world.linear().determinant() < 0.0) == flip) return {disk};
-  // Turning v turns the normal, and with it the texture coordinates, which should stay.
-  if (attachments.surface && is_textured(*attachments.surface))
-    properties.element().fail("a disk that is flipped or mirrored cannot carry a bitmap");
-  disk.v = -disk.v;
-  return {disk};
-}
-
-/// Properties that all meshes of files share, applied in Mitsuba's order.
-void finish_mesh(Properties& properties, TriangleMesh& mesh) {
-  const bool face_normals = properties.boolean("faceNormals", false);
-  if (properties.has("maxSmoothAngle")) {
-    if (face_normals)
-      properties.fail("maxSmoothAngle", "give either 'faceNormals' or 'maxSmoothAngle'");
-    split_at_creases(mesh, properties.non_negative("maxSmoothAngle", 0.0));
-  }
-  finish_normals(mesh, face_normals, properties.boolean("flipNormals", false));
-}
-
-std::vector<Geometry> read_obj_shape(Properties& properties, LoadContext& context,
-                                     const Attachments& attachments) {
-  const std::string name = properties.required_text("filename");
-  const ObjOptions options{.one_mesh = properties.boolean("collapse", false),
-                           .flip_tex_coords = properties.boolean("flipTexCoords", true)};
-  const bool load_materials = properties.boolean("loadMaterials", true);
-  const Eigen::Affine3d to_world = properties.transform("toWorld");
-  ObjFile file = with_location(properties.element(),
-                               [&] { return read_obj(context.directory / name, options); });
-  if (file.names_materials && load_materials && !attachments.surface)
-    properties.element().fail("'" + name +
-                              "' names materials of an .mtl file, which is not read; "
-                              "give the shape a bsdf, or set 'loadMaterials' to false");
-  if (attachments.radiance && file.meshes.size() > 1)
-    properties.element().fail("'" + name +
-                              "' has several groups and cannot be an emitter; set "
-                              "'collapse' to true");
-  std::vector<Geometry> result;
-  for (TriangleMesh& mesh : file.meshes) {
-    transform_mesh(mesh, to_world);
-    finish_mesh(properties, mesh);
-    result.emplace_back(std::move(mesh));
-  }
-  return result;
-}
-
-std::vector<Geometry> read_serialized_shape(Properties& properties, LoadContext& context,
-                                            const Attachments&) {
-  const std::string name = properties.required_text("filename");
-  const int index = properties.integer("shapeIndex", 0);
-  const Eigen::Affine3d to_world = properties.transform("toWorld");
-  TriangleMesh mesh = with_location(
-      properties.element(), [&] { return read_serialized(context.directory / name, index); });
-  transform_mesh(mesh, to_world);
-  // Unlike for obj files, Mitsuba keeps the outside outside when this format is mirrored.
-  if (to_world.linear().determinant() < 0.0) reverse_winding(mesh);
-  finish_mesh(properties, mesh);
-  return {std::move(mesh)};
-}
-
-using ShapeReader = std::vector<Geometry> (*)(Properties&, LoadContext&, const Attachments&);
-constexpr std::array<std::pair<std::string_view, ShapeReader>, 6> kShapes{{
+/// Those without a reader are made of other shapes.
+constexpr std::array<std::pair<std::string_view, ShapeReader>, 10> kShapes{{
     {"rectangle", &read_rectangle},
     {"cube", &read_cube},
     {"sphere", &read_sphere},
     {"disk", &read_disk},
+    {"cylinder", &read_cylinder},
     {"obj", &read_obj_shape},
+    {"ply", &read_ply_shape},
     {"serialized", &read_serialized_shape},
+    {"shapegroup", nullptr},
+    {"instance", nullptr},
 }};
 
 Attachments read_attachments(Properties& properties, LoadContext& context) {
   Attachments result;
   for (const Element& element : properties.nested({"bsdf", "ref"})) {
     if (result.surface) element.fail("a second bsdf of the shape");
-    if (properties.type() == "obj" && element.find("name"))
+    const bool by_material = properties.type() == "obj" && element.find("name");
+    if (by_material && element.dialect() == Dialect::Mitsuba06)
       element.fail("bsdfs for single materials of an obj file are not supported");
     result.surface = read_surface(element, context);
   }
@@ -182,22 +58,110 @@ std::shared_ptr<Surface> default_surface(const Attachments& attachments) {
       Surface{Diffuse{Texture(reflectance)}, std::nullopt, std::nullopt});
 }
 
+/// A shape as its reader leaves it.
+struct ShapeParts {
+  std::vector<Geometry> geometries;
+  std::shared_ptr<Surface> surface;
+  std::optional<Rgbd> radiance;
+};
+
+ShapeParts read_parts(Properties& properties, LoadContext& context, ShapeReader reader) {
+  Attachments attachments = read_attachments(properties, context);
+  ShapeParts parts{reader(properties, context, attachments), attachments.surface,
+                   attachments.radiance};
+  properties.finish();
+  if (!parts.surface) parts.surface = default_surface(attachments);
+  if (parts.radiance && parts.radiance->maxCoeff() == 0.0) parts.radiance.reset();
+  return parts;
+}
+
+void add_shape(const Element& element, Geometry geometry, Surface& surface,
+               const std::optional<Rgbd>& radiance, LoadContext& context) {
+  const std::uint32_t material = material_index(surface, context);
+  with_location(element,
+                [&] { context.builder.add_shape(std::move(geometry), material, radiance); });
+  if (++context.shape_count > kMaximumShapes)
+    element.fail(fmt::format("the scene has more than {} shapes", kMaximumShapes));
+}
+
+/// Shapes that appear only where instances of them do.
+std::shared_ptr<const ShapeGroup> read_group(Properties& properties, LoadContext& context) {
+  const auto group = std::make_shared<ShapeGroup>();
+  for (const Element& element : properties.nested({"shape"})) {
+    Properties nested(element);
+    const ShapeReader reader = find_plugin(kShapes, nested);
+    if (reader == nullptr) element.fail("instances and shapegroups cannot be nested");
+    const ShapeParts parts = read_parts(nested, context, reader);
+    if (parts.radiance) element.fail("an emitter cannot be part of a shapegroup");
+    for (const Geometry& geometry : parts.geometries) {
+      const auto* mesh = std::get_if<TriangleMesh>(&geometry);
+      if (mesh != nullptr) group->triangles += mesh->triangles.size();
+      group->parts.push_back({geometry, parts.surface});
+    }
+    context.objects.define(element, NamedObjects::Other{});
+  }
+  properties.finish();
+  if (group->parts.empty()) properties.element().fail("a shapegroup without shapes");
+  if (group->triangles > 0)
+    context.notice(
+        properties.element(),
+        fmt::format("instances are copies: each of this shapegroup's takes the memory of "
+                    "its {} triangles",
+                    group->triangles));
+  return group;
+}
+
+bool is_mirrored_texture(const ShapeGroup::Part& part, const Eigen::Affine3d& to_world) {
+  return std::holds_alternative<Disk>(part.geometry) && is_textured(*part.surface) &&
+         to_world.linear().determinant() < 0.0;
+}
+
+void add_instance(Properties& properties, LoadContext& context) {
+  const Element& element = properties.element();
+  const std::vector<Element> refs = properties.nested({"ref"});
+  if (refs.size() != 1) element.fail("an instance needs one <ref> to a shapegroup");
+  context.objects.read_ahead(refs[0], "shape",
+                             [&](const Element& target) { read_shape(target, context); });
+  const auto group =
+      context.objects.resolve<std::shared_ptr<const ShapeGroup>>(refs[0], "shapegroup");
+  const Eigen::Affine3d to_world = properties.transform("toWorld");
+  properties.finish();
+  context.instanced_triangles += group->triangles;
+  if (context.instanced_triangles > kMaximumInstanced)
+    element.fail(
+        fmt::format("the instances have more than {} triangles, each a copy", kMaximumInstanced));
+  for (const ShapeGroup::Part& part : group->parts) {
+    if (is_mirrored_texture(part, to_world))
+      properties.fail("toWorld", "a mirrored disk cannot carry a texture");
+    std::visit(
+        [&](const auto& shape) {
+          auto placed = transformed(shape, to_world);
+          if (!placed)
+            properties.fail("toWorld",
+                            "spheres must be scaled evenly, and cylinders across their axes");
+          add_shape(element, *std::move(placed), *part.surface, std::nullopt, context);
+        },
+        part.geometry);
+  }
+}
+
 }  // namespace
 
 void read_shape(const Element& element, LoadContext& context) {
+  if (context.objects.is_read(element)) return;
   Properties properties(element);
   const ShapeReader reader = find_plugin(kShapes, properties);
-  Attachments attachments = read_attachments(properties, context);
-  std::vector<Geometry> geometries = reader(properties, context, attachments);
-  properties.finish();
-
-  if (!attachments.surface) attachments.surface = default_surface(attachments);
-  const std::uint32_t material = material_index(*attachments.surface, context);
-  std::optional<Rgbd> radiance = attachments.radiance;
-  if (radiance && radiance->maxCoeff() == 0.0) radiance.reset();
-  for (Geometry& geometry : geometries)
-    with_location(element,
-                  [&] { context.builder.add_shape(std::move(geometry), material, radiance); });
+  if (properties.type() == "shapegroup") {
+    context.objects.define(element, read_group(properties, context));
+    return;
+  }
+  if (reader == nullptr) {
+    add_instance(properties, context);
+  } else {
+    ShapeParts parts = read_parts(properties, context, reader);
+    for (Geometry& geometry : parts.geometries)
+      add_shape(element, std::move(geometry), *parts.surface, parts.radiance, context);
+  }
   context.objects.define(element, NamedObjects::Other{});
 }
 

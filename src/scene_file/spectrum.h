@@ -26,6 +26,13 @@ Spectrum ramp_to_zero(Spectrum spectrum);
 /// of colours outside of the gamut, become 0.
 Rgbd spectrum_to_rgb(const Spectrum& spectrum);
 
+/// Linear sRGB of a surface of this reflectance in daylight (D65), as a Mitsuba 3 of three channels
+/// sees it: reflectance 1 is white. Negative components become 0.
+Rgbd reflectance_to_rgb(const Spectrum& reflectance);
+
+/// Radiance of a black body, W / (m^2 sr nm), over the visible range.
+Spectrum blackbody(double kelvin);
+
 /// The inverse of the sRGB transfer curve, for values from 0 to 1.
 double srgb_to_linear(double encoded);
 

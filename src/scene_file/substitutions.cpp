@@ -6,6 +6,9 @@
 namespace driftlight {
 namespace {
 
+/// A <default> may use others, so that a few lines could ask for more than memory holds.
+constexpr std::size_t kMaximumLength = std::size_t{1} << 16U;
+
 /// The identifier that the text begins with, for messages.
 std::string_view leading_identifier(std::string_view text) {
   const auto is_identifier = [](char c) {
@@ -58,6 +61,9 @@ std::string Substitutions::apply(const std::string& text) {
     result.append(text, done, dollar - done).append(values_.at(*name));
     unused_defines_.erase(*name);
     done = dollar + 1 + name->size();
+    if (result.size() > kMaximumLength)
+      throw InputError("with its $names replaced, the text is longer than " +
+                       std::to_string(kMaximumLength) + " characters");
   }
   return result.append(text, done);
 }

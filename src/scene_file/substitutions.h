@@ -13,7 +13,7 @@
 namespace driftlight {
 
 /// Values for $name. Those given by the user win over the <default>s of the file. A value is plain
-/// text: a $ in it is not substituted again, so that values cannot grow without bound.
+/// text: a $ in it is not substituted again.
 class Substitutions {
  public:
   explicit Substitutions(std::map<std::string, std::string> defines);
@@ -22,7 +22,7 @@ class Substitutions {
   void add_default(const std::string& name, const std::string& value);
 
   /// The text with every $name replaced by the value of the longest name that fits there, as
-  /// Mitsuba does. Throws InputError on a name without a value.
+  /// Mitsuba does. Throws InputError on a name without a value, or if the text grows too long.
   std::string apply(const std::string& text);
 
   /// Throws SceneError if the user defined a name that `file` neither uses nor declares.

@@ -2,42 +2,115 @@
 #include "textures_xml.h"
 
 #include <array>
+#include <string>
+
+#include "color_xml.h"
 
 namespace driftlight {
 namespace {
 
-void check_filter(Properties& properties, LoadContext& context) {
-  const std::string filter =
-      properties.choice("filterType", "ewa", {"ewa", "trilinear", "bilinear"});
-  if (filter == "bilinear") return;
-  context.notice(properties.element(),
-                 "filter '" + filter + "' is not used: textures are filtered bilinearly");
+Texture resolve_texture(const Element& ref, LoadContext& context) {
+  context.objects.read_ahead(ref, "texture",
+                             [&](const Element& target) { read_texture(target, context); });
+  return context.objects.resolve<Texture>(ref, "texture");
 }
 
-void check_wrapping(Properties& properties) {
-  for (const std::string_view name : {"wrapMode", "wrapModeU", "wrapModeV"})
-    properties.choice(name, "repeat", {"repeat"});
+/// The place of uv on the texture: in Mitsuba 0.6 by scales and offsets, in Mitsuba 3 by a
+/// transform.
+void read_mapping(Properties& properties, Texture& texture) {
+  const Eigen::Affine3d to_uv = properties.transform("toUV");
+  texture.uv_to_texture = to_uv.linear().topLeftCorner<2, 2>();
+  texture.uv_offset = to_uv.translation().head<2>();
+  if (properties.has("toUV")) return;
+  const double both = properties.number("uvscale", 1.0);
+  texture.uv_to_texture =
+      Vec2d(properties.number("uscale", both), properties.number("vscale", both)).asDiagonal();
+  texture.uv_offset = {properties.number("uoffset", 0.0), properties.number("voffset", 0.0)};
+  properties.choice("coordinates", "uv", {"uv"});
+}
+
+void read_filter_type(Properties& properties, Texture& texture, LoadContext& context) {
+  const bool newer = properties.dialect() == Dialect::Mitsuba3;
+  const std::string filter = properties.choice("filterType", newer ? "bilinear" : "ewa",
+                                               {"ewa", "trilinear", "bilinear", "nearest"});
+  texture.interpolates = filter != "nearest";
+  if (filter == "ewa" || filter == "trilinear")
+    context.notice(properties.element(),
+                   "filter '" + filter + "' is not used: textures are filtered bilinearly");
+}
+
+Wrap read_wrap(Properties& properties, std::string_view name, const std::string& fallback) {
+  const std::string mode =
+      properties.choice(name, fallback, {"repeat", "clamp", "mirror", "zero", "one"});
+  if (mode == "clamp") return Wrap::Clamp;
+  if (mode == "mirror") return Wrap::Mirror;
+  if (mode == "zero") return Wrap::Zero;
+  return mode == "one" ? Wrap::One : Wrap::Repeat;
 }
 
 Texture read_bitmap_texture(Properties& properties, LoadContext& context) {
   Texture texture;
   const std::string file = properties.required_text("filename");
-  const std::optional<Gamma> gamma = read_gamma(properties);
+  std::optional<Gamma> gamma = read_gamma(properties);
+  if (properties.boolean("raw", false)) gamma = 1.0;
   texture.bitmap = with_location(properties.element(), [&] {
-    return std::make_shared<const Bitmap>(read_bitmap(context.directory / file, gamma));
+    return std::make_shared<const Bitmap>(read_bitmap(properties.element().find_file(file), gamma));
   });
-  const double both = properties.number("uvscale", 1.0);
-  texture.uv_scale = {properties.number("uscale", both), properties.number("vscale", both)};
-  texture.uv_offset = {properties.number("uoffset", 0.0), properties.number("voffset", 0.0)};
-  check_filter(properties, context);
-  check_wrapping(properties);
-  properties.ignore({"cache", "maxAnisotropy"});
+  read_mapping(properties, texture);
+  read_filter_type(properties, texture, context);
+  const std::string both = properties.text("wrapMode").value_or("repeat");
+  texture.wrap_u = read_wrap(properties, "wrapMode", "repeat");
+  texture.wrap_u = read_wrap(properties, "wrapModeU", both);
+  texture.wrap_v = read_wrap(properties, "wrapModeV", both);
+  properties.ignore({"cache", "maxAnisotropy", "accel", "format"});
   return texture;
 }
 
+Texture read_pattern(Properties& properties, TwoColors pattern) {
+  Texture texture;
+  pattern.color0 = properties.color("color0", pattern.color0);
+  pattern.color1 = properties.color("color1", pattern.color1);
+  texture.pattern = pattern;
+  read_mapping(properties, texture);
+  return texture;
+}
+
+Texture read_checkerboard(Properties& properties, LoadContext&) {
+  return read_pattern(
+      properties, {TwoColors::Layout::Checkerboard, Rgbd::Constant(0.4), Rgbd::Constant(0.2), 0.0});
+}
+
+Texture read_grid(Properties& properties, LoadContext&) {
+  const double width = properties.non_negative("lineWidth", 0.01);
+  return read_pattern(properties,
+                      {TwoColors::Layout::Grid, Rgbd::Constant(0.2), Rgbd::Constant(0.4), width});
+}
+
+/// A texture or colour, times a factor.
+Texture read_scaled(Properties& properties, LoadContext& context) {
+  const std::optional<Element> factor = properties.find("scale");
+  const bool is_number = factor && (factor->tag() == "float" || factor->tag() == "integer");
+  const Rgbd by = is_number ? Rgbd::Constant(properties.non_negative("scale", 1.0))
+                            : properties.color("scale", kWhite);
+  std::optional<Texture> texture;
+  if (properties.has("value")) texture = Texture(properties.color("value", kWhite));
+  for (const Element& nested : properties.nested({"texture", "ref"})) {
+    if (texture) nested.fail("a second texture to scale");
+    texture =
+        nested.tag() == "ref" ? resolve_texture(nested, context) : read_texture(nested, context);
+  }
+  if (!texture) properties.element().fail("texture 'scale' needs a texture or a 'value' to scale");
+  scale(*texture, by);
+  return *texture;
+}
+
 using TextureReader = Texture (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, TextureReader>, 1> kTextures{
-    {{"bitmap", &read_bitmap_texture}}};
+constexpr std::array<std::pair<std::string_view, TextureReader>, 4> kTextures{{
+    {"bitmap", &read_bitmap_texture},
+    {"checkerboard", &read_checkerboard},
+    {"gridtexture", &read_grid},
+    {"scale", &read_scaled},
+}};
 
 }  // namespace
 
@@ -49,6 +122,7 @@ std::optional<Gamma> read_gamma(Properties& properties) {
 }
 
 Texture read_texture(const Element& element, LoadContext& context) {
+  if (const auto* read = context.objects.find_read<Texture>(element)) return *read;
   Properties properties(element);
   Texture texture = find_plugin(kTextures, properties)(properties, context);
   properties.finish();
@@ -60,18 +134,11 @@ Texture read_textured(Properties& properties, std::string_view name, const Rgbd&
                       LoadContext& context) {
   const auto child = properties.find(name);
   if (child && child->tag() == "texture") return read_texture(*child, context);
-  if (child && child->tag() == "ref") return context.objects.resolve<Texture>(*child, "texture");
+  if (child && child->tag() == "ref") return resolve_texture(*child, context);
   return Texture(properties.color(name, fallback));
 }
 
-Rgbd maximum_color(const Texture& texture) {
-  if (texture.is_constant()) return texture.color;
-  Eigen::Array3f maximum = Eigen::Array3f::Zero();
-  for (const Eigen::Array3f& texel : texture.bitmap->texels) maximum = maximum.max(texel);
-  return texture.scale * maximum.cast<double>();
-}
-
-void scale(Texture& texture, double factor) {
+void scale(Texture& texture, const Rgbd& factor) {
   texture.color *= factor;
   texture.scale *= factor;
 }

@@ -8,16 +8,14 @@
 
 namespace driftlight {
 
-/// <texture type="bitmap">.
+/// <texture> of type bitmap, checkerboard, gridtexture or scale.
 Texture read_texture(const Element& element, LoadContext& context);
 
 /// A property that may be a colour, a <texture> or a <ref> to one.
 Texture read_textured(Properties& properties, std::string_view name, const Rgbd& fallback,
                       LoadContext& context);
 
-/// The largest value of each component.
-Rgbd maximum_color(const Texture& texture);
-void scale(Texture& texture, double factor);
+void scale(Texture& texture, const Rgbd& factor);
 
 /// The property `gamma` of images: absent or 0 (up to the file), -1 (sRGB) or a positive power.
 std::optional<Gamma> read_gamma(Properties& properties);

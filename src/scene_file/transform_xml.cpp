@@ -2,6 +2,7 @@
 #include "transform_xml.h"
 
 #include <Eigen/LU>
+#include <array>
 #include <cmath>
 
 #include "driftlight/scalar.h"
@@ -10,8 +11,16 @@ namespace driftlight {
 namespace {
 
 Vec3d read_xyz(const Element& element, double fallback) {
-  return {element.number("x", fallback), element.number("y", fallback),
-          element.number("z", fallback)};
+  const std::array<double, 3> xyz = element.xyz(fallback);
+  return {xyz[0], xyz[1], xyz[2]};
+}
+
+/// Mitsuba 3 also takes three numbers at once, as `value`.
+void allow_xyz(const Element& element) {
+  if (element.dialect() == Dialect::Mitsuba3)
+    element.allow_attributes({"x", "y", "z", "value"});
+  else
+    element.allow_attributes({"x", "y", "z"});
 }
 
 Vec3d read_vector(const Element& element, const char* attribute) {
@@ -20,12 +29,15 @@ Vec3d read_vector(const Element& element, const char* attribute) {
 }
 
 Eigen::Affine3d read_translate(const Element& element) {
-  element.allow_attributes({"x", "y", "z"});
+  allow_xyz(element);
   return Eigen::Affine3d(Eigen::Translation3d(read_xyz(element, 0.0)));
 }
 
 Eigen::Affine3d read_rotate(const Element& element) {
-  element.allow_attributes({"x", "y", "z", "angle"});
+  if (element.dialect() == Dialect::Mitsuba3)
+    element.allow_attributes({"x", "y", "z", "value", "angle"});
+  else
+    element.allow_attributes({"x", "y", "z", "angle"});
   const Vec3d axis = read_xyz(element, 0.0);
   if (!(axis.norm() > 0.0)) element.fail("<rotate> needs an axis: x, y or z must not be 0");
   const double angle = element.number("angle") * kPi / 180.0;
@@ -37,7 +49,9 @@ Eigen::Affine3d read_scale(const Element& element) {
   const bool by_axis = element.find("x") || element.find("y") || element.find("z");
   if (by_axis == element.find("value").has_value())
     element.fail("<scale> needs either 'value' or some of 'x', 'y', 'z'");
-  const Vec3d factors = by_axis ? read_xyz(element, 1.0) : Vec3d::Constant(element.number("value"));
+  const bool three_at_once = element.dialect() == Dialect::Mitsuba3;
+  const Vec3d factors =
+      by_axis || three_at_once ? read_xyz(element, 1.0) : Vec3d::Constant(element.number("value"));
   return Eigen::Affine3d(Eigen::Scaling(factors));
 }
 

@@ -43,6 +43,7 @@ XmlDocument::XmlDocument(const std::filesystem::path& file)
   if (second && second.type() == pugi::node_element)
     throw SceneError(location(second), "a second outermost element");
   check_depth();
+  collect_ids();
 }
 
 void XmlDocument::check_depth() const {
@@ -72,16 +73,32 @@ SourceLocation XmlDocument::location(std::size_t offset) const {
   return result;
 }
 
+/// Of elements with the same id the first.
+void XmlDocument::collect_ids() {
+  struct Collector : pugi::xml_tree_walker {
+    std::map<std::string, pugi::xml_node>* ids = nullptr;
+
+    bool for_each(pugi::xml_node& node) override {
+      const pugi::xml_attribute id = node.attribute("id");
+      const std::string_view name = node.name();
+      if (id && name != "ref" && name != "alias") ids->emplace(id.value(), node);
+      return true;
+    }
+  };
+  Collector collector;
+  collector.ids = &ids_;
+  document_.traverse(collector);
+}
+
 pugi::xml_node XmlDocument::find_id(const std::string& id) const {
-  return document_.find_node([&](pugi::xml_node node) {
-    return std::string_view(node.name()) != "ref" && id == node.attribute("id").value();
-  });
+  const auto found = ids_.find(id);
+  return found == ids_.end() ? pugi::xml_node() : found->second;
 }
 
 std::optional<std::string> Element::find(const char* attribute) const {
   const pugi::xml_attribute found = node_.attribute(attribute);
   if (!found) return std::nullopt;
-  return with_location(*this, [&] { return substitutions_->apply(found.value()); });
+  return with_location(*this, [&] { return surroundings_->substitutions.apply(found.value()); });
 }
 
 std::string Element::text(const char* attribute) const {
@@ -113,10 +130,28 @@ std::vector<double> Element::numbers(const char* attribute, std::size_t count) c
   return result;
 }
 
+std::array<double, 3> Element::xyz(std::optional<double> fallback) const {
+  constexpr std::array kAxes{"x", "y", "z"};
+  if (dialect() == Dialect::Mitsuba3 && find("value")) {
+    for (const char* axis : kAxes)
+      if (find(axis)) fail("<" + tag() + "> needs either 'value' or 'x', 'y' and 'z'");
+    if (split_list(text("value")).size() == 1) {
+      const double same = number("value");
+      return {same, same, same};
+    }
+    const std::vector<double> values = numbers("value", 3);
+    return {values[0], values[1], values[2]};
+  }
+  std::array<double, 3> result{};
+  for (std::size_t i = 0; i < kAxes.size(); ++i)
+    result.at(i) = fallback ? number(kAxes.at(i), *fallback) : number(kAxes.at(i));
+  return result;
+}
+
 std::vector<Element> Element::children() const {
   std::vector<Element> result;
   for (const pugi::xml_node child : node_.children())
-    if (child.type() == pugi::node_element) result.emplace_back(*document_, child, *substitutions_);
+    if (child.type() == pugi::node_element) result.emplace_back(*document_, child, *surroundings_);
   return result;
 }
 
@@ -139,7 +174,7 @@ void Element::fail(const std::string& message) const { throw SceneError(location
 std::optional<Element> Element::find_id(const std::string& id) const {
   const pugi::xml_node node = document_->find_id(id);
   if (!node) return std::nullopt;
-  return Element(*document_, node, *substitutions_);
+  return Element(*document_, node, *surroundings_);
 }
 
 bool Element::is_inside(const Element& other) const {

@@ -2,15 +2,19 @@
 /// XML files whose elements know where they stand.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <initializer_list>
+#include <map>
 #include <optional>
 #include <pugixml.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "dialect.h"
 #include "driftlight/error.h"
+#include "search_path.h"
 #include "substitutions.h"
 
 namespace driftlight {
@@ -25,6 +29,9 @@ class XmlDocument {
   XmlDocument& operator=(const XmlDocument&) = delete;
 
   pugi::xml_node root() const { return document_.document_element(); }
+  Dialect dialect() const { return dialect_; }
+  void set_dialect(Dialect dialect) { dialect_ = dialect; }
+  std::filesystem::path directory() const { return std::filesystem::path(name_).parent_path(); }
   /// Of the '<' that opens the element.
   SourceLocation location(pugi::xml_node node) const;
   /// The first element with this id, as written.
@@ -34,19 +41,31 @@ class XmlDocument {
   /// Of a byte of the file; columns count characters.
   SourceLocation location(std::size_t offset) const;
   void check_depth() const;
+  void collect_ids();
 
   std::string name_;
   std::string text_;
   pugi::xml_document document_;
+  std::map<std::string, pugi::xml_node> ids_;
+  Dialect dialect_ = Dialect::Mitsuba06;
+};
+
+/// What the texts of attributes mean depends on these, which change as elements are read.
+struct Surroundings {
+  Substitutions substitutions;
+  SearchPath search_path;
 };
 
 /// One element; attributes are read after substitution of $names.
 class Element {
  public:
-  Element(const XmlDocument& document, pugi::xml_node node, Substitutions& substitutions)
-      : document_(&document), node_(node), substitutions_(&substitutions) {}
+  Element(const XmlDocument& document, pugi::xml_node node, Surroundings& surroundings)
+      : document_(&document), node_(node), surroundings_(&surroundings) {}
 
   std::string tag() const { return node_.name(); }
+  /// Tag of the element around this one; empty if there is none.
+  std::string parent_tag() const { return node_.parent().name(); }
+  Dialect dialect() const { return document_->dialect(); }
   std::optional<std::string> find(const char* attribute) const;
   /// The same, and throws SceneError if it is missing.
   std::string text(const char* attribute) const;
@@ -54,6 +73,13 @@ class Element {
   double number(const char* attribute, double fallback) const;
   /// `count` numbers, separated by commas or blanks.
   std::vector<double> numbers(const char* attribute, std::size_t count) const;
+  /// Three numbers: the attributes x, y and z, or in the newer dialect a `value` of one or three.
+  /// What is missing is the fallback; without one that is an error.
+  std::array<double, 3> xyz(std::optional<double> fallback = std::nullopt) const;
+  /// A file by its name, wherever the scene's files are looked for.
+  std::filesystem::path find_file(const std::string& name) const {
+    return surroundings_->search_path.find(name, document_->directory());
+  }
 
   std::vector<Element> children() const;
   /// Throws SceneError on an attribute with another name.
@@ -69,11 +95,13 @@ class Element {
   /// The element of the same file with this id, if any.
   std::optional<Element> find_id(const std::string& id) const;
   bool is_inside(const Element& other) const;
+  /// True if both are the same element of the same file.
+  bool operator==(const Element& other) const { return node_ == other.node_; }
 
  private:
   const XmlDocument* document_;
   pugi::xml_node node_;
-  Substitutions* substitutions_;
+  Surroundings* surroundings_;
 };
 
 /// Runs `read` and gives its InputErrors, which know no place, the place of the element.

@@ -128,7 +128,7 @@ const Rgbd kGoldK{3.983, 2.386, 1.603};
 Texture textured(int size, double low, double high) {
   Texture texture;
   texture.bitmap = pattern_bitmap(size, size, low, high);
-  texture.uv_scale = {2.0, 1.5};
+  texture.uv_to_texture = Vec2d(2.0, 1.5).asDiagonal();
   texture.uv_offset = {0.13, 0.29};
   return texture;
 }

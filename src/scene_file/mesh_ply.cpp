@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mesh_ply.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <string_view>
+
+#include "driftlight/error.h"
+#include "mesh.h"
+#include "ply_header.h"
+#include "text.h"
+
+namespace driftlight {
+namespace {
+
+/// The values that follow the header, one by one.
+class PlyValues {
+ public:
+  PlyValues(std::string_view bytes, PlyEncoding encoding) : bytes_(bytes), encoding_(encoding) {}
+
+  double next(PlyType type) {
+    if (encoding_ == PlyEncoding::Ascii) return next_word();
+    switch (type) {
+      case PlyType::Int8:
+        return next_bytes<std::int8_t>();
+      case PlyType::UInt8:
+        return next_bytes<std::uint8_t>();
+      case PlyType::Int16:
+        return next_bytes<std::int16_t>();
+      case PlyType::UInt16:
+        return next_bytes<std::uint16_t>();
+      case PlyType::Int32:
+        return next_bytes<std::int32_t>();
+      case PlyType::UInt32:
+        return next_bytes<std::uint32_t>();
+      case PlyType::Float32:
+        return static_cast<double>(next_bytes<float>());
+      case PlyType::Float64:
+        return next_bytes<double>();
+    }
+    return 0.0;
+  }
+
+  /// Throws InputError unless there can be `count` rows of so many bytes (binary) or values (text)
+  /// each. It bounds what a corrupt header can make us allocate.
+  void expect(const PlyElement& element) const {
+    std::uint64_t row = 0;
+    for (const PlyProperty& property : element.properties)
+      row += encoding_ == PlyEncoding::Ascii ? 1
+                                             : size_of(property.count_type.value_or(property.type));
+    if (row > 0 && element.count > bytes_.size() / row)
+      throw InputError(
+          fmt::format("it is truncated: it says that it has {} elements '{}', which is more than "
+                      "its size allows",
+                      element.count, element.name));
+  }
+
+  /// The number of values of a list, which are still to come.
+  std::size_t next_count(PlyType type) {
+    const double count = next(type);
+    if (!(count >= 0.0 && count <= static_cast<double>(bytes_.size())))
+      throw InputError("it is truncated: a list is longer than the file");
+    return static_cast<std::size_t>(count);
+  }
+
+ private:
+  template <class T>
+  T next_bytes() {
+    if (bytes_.size() < sizeof(T)) throw InputError("it is truncated");
+    std::array<char, sizeof(T)> bytes{};
+    std::copy_n(bytes_.begin(), sizeof(T), bytes.begin());
+    bytes_.remove_prefix(sizeof(T));
+    const bool is_little = encoding_ == PlyEncoding::LittleEndian;
+    if (is_little != (std::endian::native == std::endian::little))
+      std::reverse(bytes.begin(), bytes.end());
+    T result;
+    std::memcpy(&result, bytes.data(), sizeof(T));
+    return result;
+  }
+
+  double next_word() {
+    constexpr std::string_view kBlanks = " \t\r\n";
+    bytes_.remove_prefix(std::min(bytes_.find_first_not_of(kBlanks), bytes_.size()));
+    if (bytes_.empty()) throw InputError("it is truncated");
+    const std::string_view word = bytes_.substr(0, bytes_.find_first_of(kBlanks));
+    bytes_.remove_prefix(word.size());
+    if (const auto number = parse_number(word)) return *number;
+    throw InputError(fmt::format("'{}' is not a finite number", word.substr(0, 40)));
+  }
+
+  std::string_view bytes_;
+  PlyEncoding encoding_;
+};
+
+/// Where a property of a vertex belongs: x, y, z, nx, ny, nz, u, v.
+std::optional<std::size_t> vertex_slot(const PlyProperty& property) {
+  constexpr std::array<std::pair<std::string_view, std::size_t>, 12> kSlots{{
+      {"x", 0},
+      {"y", 1},
+      {"z", 2},
+      {"nx", 3},
+      {"ny", 4},
+      {"nz", 5},
+      {"u", 6},
+      {"v", 7},
+      {"s", 6},
+      {"t", 7},
+      {"texture_u", 6},
+      {"texture_v", 7},
+  }};
+  for (const auto& [name, slot] : kSlots)
+    if (property.name == name && !property.count_type) return slot;
+  return std::nullopt;
+}
+
+bool is_polygon(const PlyProperty& property) {
+  return property.count_type &&
+         (property.name == "vertex_indices" || property.name == "vertex_index");
+}
+
+class PlyReader {
+ public:
+  PlyReader(const PlyHeader& header, PlyValues values) : header_(header), values_(values) {}
+
+  PlyFile read() {
+    for (const PlyElement& element : header_.elements) {
+      values_.expect(element);
+      if (element.name == "vertex")
+        read_vertices(element);
+      else if (element.name == "face")
+        read_faces(element);
+      else
+        skip(element);
+    }
+    check_mesh(file_.mesh);
+    return std::move(file_);
+  }
+
+ private:
+  void read_vertices(const PlyElement& element) {
+    TriangleMesh& mesh = file_.mesh;
+    if (!mesh.positions.empty()) throw InputError("it has two lists of vertices");
+    std::vector<std::optional<std::size_t>> slots;
+    std::array<bool, 8> has{};
+    for (const PlyProperty& property : element.properties) {
+      slots.push_back(vertex_slot(property));
+      if (slots.back())
+        has.at(*slots.back()) = true;
+      else
+        file_.unused.push_back("vertex " + property.name);
+    }
+    if (!has[0] || !has[1] || !has[2]) throw InputError("its vertices lack x, y or z");
+    const bool has_normals = has[3] && has[4] && has[5];
+    const bool has_uvs = has[6] && has[7];
+    mesh.positions.reserve(element.count);
+    std::array<float, 8> row{};
+    for (std::uint64_t i = 0; i < element.count; ++i) {
+      for (std::size_t k = 0; k < slots.size(); ++k) {
+        if (slots[k])
+          row.at(*slots[k]) = static_cast<float>(values_.next(element.properties[k].type));
+        else
+          skip(element.properties[k]);
+      }
+      mesh.positions.emplace_back(row[0], row[1], row[2]);
+      if (has_normals) mesh.normals.emplace_back(row[3], row[4], row[5]);
+      if (has_uvs) mesh.uvs.emplace_back(row[6], row[7]);
+    }
+  }
+
+  void read_faces(const PlyElement& element) {
+    if (std::none_of(element.properties.begin(), element.properties.end(), &is_polygon))
+      throw InputError("its faces lack the list 'vertex_indices'");
+    for (const PlyProperty& property : element.properties)
+      if (!is_polygon(property)) file_.unused.push_back("face " + property.name);
+    for (std::uint64_t i = 0; i < element.count; ++i)
+      for (const PlyProperty& property : element.properties) {
+        if (is_polygon(property))
+          read_polygon(property);
+        else
+          skip(property);
+      }
+  }
+
+  /// A fan around the first corner.
+  void read_polygon(const PlyProperty& property) {
+    const std::size_t count = values_.next_count(*property.count_type);
+    if (count < 3) throw InputError("a face has fewer than three corners");
+    const std::uint32_t first = read_index(property.type);
+    std::uint32_t last = read_index(property.type);
+    for (std::size_t i = 2; i < count; ++i) {
+      const std::uint32_t next = read_index(property.type);
+      file_.mesh.triangles.push_back({first, last, next});
+      last = next;
+    }
+  }
+
+  std::uint32_t read_index(PlyType type) {
+    const double index = values_.next(type);
+    const auto whole = static_cast<std::uint32_t>(std::clamp(index, 0.0, 4294967295.0));
+    if (static_cast<double>(whole) != index)
+      throw InputError(fmt::format("a face refers to vertex {}", index));
+    return whole;
+  }
+
+  void skip(const PlyElement& element) {
+    if (element.properties.empty()) return;
+    for (std::uint64_t i = 0; i < element.count; ++i)
+      for (const PlyProperty& property : element.properties) skip(property);
+  }
+
+  void skip(const PlyProperty& property) {
+    const std::size_t count = property.count_type ? values_.next_count(*property.count_type) : 1;
+    for (std::size_t i = 0; i < count; ++i) values_.next(property.type);
+  }
+
+  const PlyHeader& header_;
+  PlyValues values_;
+  PlyFile file_;
+};
+
+std::string read_ply_bytes(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || std::filesystem::is_directory(file)) throw InputError("it cannot be opened");
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+}  // namespace
+
+PlyFile read_ply(const std::filesystem::path& file) {
+  try {
+    const std::string bytes = read_ply_bytes(file);
+    const PlyHeader header = read_ply_header(bytes);
+    const std::string_view body = std::string_view(bytes).substr(header.size);
+    return PlyReader(header, PlyValues(body, header.encoding)).read();
+  } catch (const InputError& error) {
+    throw InputError("the mesh '" + file.string() + "' is not usable: " + error.what());
+  }
+}
+
+}  // namespace driftlight

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+
+#include "mesh.h"
+#include "mesh_obj.h"
+#include "mesh_ply.h"
+#include "mesh_serialized.h"
+#include "shape_readers.h"
+
+namespace driftlight {
+namespace {
+
+/// Whether meshes that are mirrored keep their outside, or turn inside out as their triangles do.
+/// Mitsuba 0.6 does either, by the format; Mitsuba 3 always keeps it.
+enum class Mirrored { KeepsOutside, TurnsInsideOut };
+
+/// Properties that all meshes of files share, applied in Mitsuba's order.
+void finish_mesh(Properties& properties, TriangleMesh& mesh, Mirrored mirrored) {
+  const Eigen::Affine3d to_world = properties.transform("toWorld");
+  transform_mesh(mesh, to_world);
+  const bool keep = mirrored == Mirrored::KeepsOutside || properties.dialect() == Dialect::Mitsuba3;
+  if (keep && to_world.linear().determinant() < 0.0) reverse_winding(mesh);
+  const bool face_normals = properties.boolean("faceNormals", false);
+  if (properties.has("maxSmoothAngle")) {
+    if (face_normals)
+      properties.fail("maxSmoothAngle", "give either 'faceNormals' or 'maxSmoothAngle'");
+    split_at_creases(mesh, properties.non_negative("maxSmoothAngle", 0.0));
+  }
+  finish_normals(mesh, face_normals, properties.boolean("flipNormals", false));
+}
+
+}  // namespace
+
+std::vector<Geometry> read_obj_shape(Properties& properties, LoadContext&,
+                                     const Attachments& attachments) {
+  const std::string name = properties.required_text("filename");
+  // Mitsuba 3 knows neither groups nor materials of obj files.
+  const bool plain = properties.dialect() == Dialect::Mitsuba3;
+  const ObjOptions options{.one_mesh = plain || properties.boolean("collapse", false),
+                           .flip_tex_coords = properties.boolean("flipTexCoords", true)};
+  const bool load_materials = !plain && properties.boolean("loadMaterials", true);
+  ObjFile file = with_location(properties.element(), [&] {
+    return read_obj(properties.element().find_file(name), options);
+  });
+  if (file.names_materials && load_materials && !attachments.surface)
+    properties.element().fail("'" + name +
+                              "' names materials of an .mtl file, which is not read; "
+                              "give the shape a bsdf, or set 'loadMaterials' to false");
+  if (attachments.radiance && file.meshes.size() > 1)
+    properties.element().fail("'" + name +
+                              "' has several groups and cannot be an emitter; set "
+                              "'collapse' to true");
+  std::vector<Geometry> result;
+  for (TriangleMesh& mesh : file.meshes) {
+    finish_mesh(properties, mesh, Mirrored::TurnsInsideOut);
+    result.emplace_back(std::move(mesh));
+  }
+  return result;
+}
+
+std::vector<Geometry> read_ply_shape(Properties& properties, LoadContext& context,
+                                     const Attachments&) {
+  const std::string name = properties.required_text("filename");
+  const bool flip = properties.boolean("flipTexCoords", false);
+  properties.ignore({"srgb"});  // of the colours, which no texture here looks at
+  PlyFile file = with_location(properties.element(),
+                               [&] { return read_ply(properties.element().find_file(name)); });
+  if (flip)
+    for (Eigen::Vector2f& uv : file.mesh.uvs) uv.y() = 1.0F - uv.y();
+  if (!file.unused.empty())
+    context.notice(properties.element(), fmt::format("'{}' has properties that are not used: {}",
+                                                     name, join(file.unused)));
+  finish_mesh(properties, file.mesh, Mirrored::TurnsInsideOut);
+  return {std::move(file.mesh)};
+}
+
+std::vector<Geometry> read_serialized_shape(Properties& properties, LoadContext&,
+                                            const Attachments&) {
+  const std::string name = properties.required_text("filename");
+  const int index = properties.integer("shapeIndex", 0);
+  TriangleMesh mesh = with_location(properties.element(), [&] {
+    return read_serialized(properties.element().find_file(name), index);
+  });
+  finish_mesh(properties, mesh, Mirrored::KeepsOutside);
+  return {std::move(mesh)};
+}
+
+}  // namespace driftlight

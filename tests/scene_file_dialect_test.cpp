@@ -1,0 +1,358 @@
+// SPDX-License-Identifier: Apache-2.0
+/// The dialect of Mitsuba 3, and what both dialects name: ids, files and substitutes.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "driftlight/scene_file.h"
+#include "scene_file/dialect.h"
+#include "support/scene_directory.h"
+
+namespace driftlight {
+namespace {
+
+using test::complete;
+using test::expect_near;
+using test::kEmitter;
+using test::kSensor;
+using test::kShape;
+using test::lit;
+using test::SceneDirectory;
+
+std::string mitsuba3(const std::string& body) {
+  return "<scene version=\"3.0.0\">\n" + body + "\n</scene>\n";
+}
+
+/// A scene of the newer dialect: the body, a sensor and an emitter.
+std::string lit3(const std::string& body) { return mitsuba3(body + kSensor + kEmitter); }
+
+std::string error_of(const std::string& scene) {
+  const SceneDirectory directory;
+  try {
+    directory.load(scene);
+  } catch (const SceneError& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "loaded without an error";
+  return {};
+}
+
+void expect_contains(const std::string& text, const std::string& fragment) {
+  EXPECT_NE(text.find(fragment), std::string::npos) << "no \"" << fragment << "\" in: " << text;
+}
+
+Bsdf first_bsdf(const std::string& scene) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(scene);
+  return loaded.scene.bsdfs()[0];
+}
+
+TEST(Dialect, SpellsNames) {
+  EXPECT_EQ(snake_case("toWorld"), "to_world");
+  EXPECT_EQ(snake_case("intIOR"), "int_ior");
+  EXPECT_EQ(snake_case("wrapModeU"), "wrap_mode_u");
+  EXPECT_EQ(snake_case("to_world"), "to_world");
+  EXPECT_EQ(snake_case("uvscale"), "uvscale");
+  EXPECT_EQ(spelling("fovAxis", Dialect::Mitsuba06), "fovAxis");
+  EXPECT_EQ(spelling("fovAxis", Dialect::Mitsuba3), "fov_axis");
+}
+
+TEST(Dialect, FollowsTheVersion) {
+  EXPECT_EQ(dialect_of("0.5.0"), Dialect::Mitsuba06);
+  EXPECT_EQ(dialect_of("0.6.0"), Dialect::Mitsuba06);
+  EXPECT_EQ(dialect_of("2.1.0"), Dialect::Mitsuba3);
+  EXPECT_EQ(dialect_of("3.5.2"), Dialect::Mitsuba3);
+  EXPECT_EQ(dialect_of("1.0.0"), std::nullopt);
+  EXPECT_EQ(dialect_of(""), std::nullopt);
+}
+
+TEST(Dialect, ReadsAWholeSceneOfMitsuba3) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(mitsuba3(R"(
+    <default name="depth" value="7"/>
+    <integrator type="path"><integer name="max_depth" value="$depth"/>
+      <integer name="rr_depth" value="5"/><boolean name="hide_emitters" value="false"/></integrator>
+    <sensor type="perspective">
+      <string name="fov_axis" value="y"/><float name="fov" value="60"/>
+      <float name="near_clip" value="2"/><float name="far_clip" value="50"/>
+      <float name="principal_point_offset_x" value="0"/>
+      <transform name="to_world"><lookat origin="1, 2, 3" target="1, 2, -5" up="0, 3, 1"/>
+      </transform>
+      <film type="hdrfilm"><integer name="width" value="200"/><integer name="height" value="100"/>
+        <string name="pixel_format" value="rgb"/><string name="component_format" value="float32"/>
+        <boolean name="sample_border" value="true"/><rfilter type="box"/></film>
+    </sensor>
+    <shape type="sphere"><point name="center" value="1, 0, 0"/><boolean name="flip_normals"
+      value="true"/><transform name="to_world"><scale value="3"/><translate value="0, 0, 1"/>
+      <rotate value="0, 0, 1" angle="90"/></transform>
+      <bsdf type="dielectric"><float name="int_ior" value="1.5"/><float name="ext_ior" value="1"/>
+        <rgb name="specular_transmittance" value="0.5"/></bsdf></shape>
+    <emitter type="spot"><float name="cutoff_angle" value="30"/><float name="beam_width"
+      value="12"/><float name="intensity" value="2"/></emitter>)"));
+  EXPECT_TRUE(loaded.notices.empty()) << loaded.notices[0];
+  EXPECT_EQ(loaded.max_depth, 7);
+  const PerspectiveCamera& camera = loaded.scene.camera();
+  expect_near(camera.forward, Vec3d(0, 0, -1));
+  EXPECT_NEAR(camera.half_height, std::tan(kPi / 6.0), 1e-12);
+  EXPECT_EQ(camera.near_clip, 2);
+  // The center is scaled, too.
+  const auto& sphere = std::get<Sphere>(loaded.scene.shapes()[0].geometry);
+  expect_near(sphere.center, Vec3d(0, 3, 1));
+  EXPECT_NEAR(sphere.radius, 3.0, 1e-12);
+  EXPECT_TRUE(sphere.flip_normals);
+  const auto& glass = std::get<Dielectric>(loaded.scene.bsdfs()[0]);
+  EXPECT_EQ(glass.eta, 1.5);
+  expect_near(glass.specular_transmittance.color, Rgbd(0.5, 0.5, 0.5));
+  const auto& spot = std::get<SpotEmitter>(loaded.scene.emitters()[0]);
+  EXPECT_NEAR(spot.beam_width(), kPi / 15.0, 1e-12);
+  expect_near(spot.intensity(), Rgbd(2, 2, 2));
+}
+
+TEST(Dialect, MessagesSpellNamesAsTheFileDoes) {
+  const std::string unknown =
+      error_of(lit3(R"(<shape type="sphere"><float name="to_wrold" value="1"/></shape>)"));
+  expect_contains(unknown, "'to_wrold'");
+  expect_contains(unknown, "to_world");
+  EXPECT_EQ(unknown.find("toWorld"), std::string::npos) << unknown;
+  expect_contains(error_of(lit(R"(<shape type="sphere"><float name="radius" value="1"/>
+                                  <float name="flip" value="1"/></shape>)")),
+                  "flipNormals");
+  expect_contains(error_of(lit3(R"(<shape type="sphere"><boolean name="flip_normals" value="true"/>
+                                   <boolean name="flipNormals" value="true"/></shape>)")),
+                  "'flipNormals' is given twice");
+}
+
+TEST(Dialect, AMetalWithoutANameReflectsAllInMitsuba3) {
+  const std::string shape = R"(<shape type="sphere"><bsdf type="roughconductor"/></shape>)";
+  const auto mirror = std::get<RoughConductor>(first_bsdf(lit3(shape)));
+  expect_near(mirror.eta, Rgbd(0, 0, 0));
+  const auto copper = std::get<RoughConductor>(first_bsdf(lit(shape)));
+  EXPECT_GT(copper.eta.minCoeff(), 0.0);
+}
+
+TEST(Dialect, Mitsuba3TakesTheFirstOfSeveralSensors) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(lit3(kShape + kSensor));
+  ASSERT_EQ(loaded.notices.size(), 1U);
+  expect_contains(loaded.notices[0], "sensor");
+}
+
+// --- Ids -----------------------------------------------------------------------------------------
+
+const std::string kRedShape = R"(<shape type="sphere"><ref id="red"/></shape>)";
+const std::string kRed =
+    R"(<bsdf type="diffuse" id="red"><ref id="paint" name="reflectance"/></bsdf>)";
+
+TEST(Ids, Mitsuba3RefersToWhatStandsFurtherDown) {
+  const std::string shapes = kRedShape + kRedShape +
+                             R"(<bsdf type="twosided" id="red"><ref id="inner"/></bsdf>
+      <bsdf type="diffuse" id="inner"><rgb name="reflectance" value="0.9, 0, 0"/></bsdf>)";
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(lit3(shapes));
+  EXPECT_EQ(loaded.scene.materials().size(), 1U);
+  expect_near(std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance.color, Rgbd(0.9, 0, 0));
+  expect_contains(error_of(lit(shapes)), "further down");
+}
+
+TEST(Ids, CirclesAreRefused) {
+  expect_contains(error_of(lit3(kRedShape + R"(<bsdf type="twosided" id="red"><ref id="b"/></bsdf>
+      <bsdf type="twosided" id="b"><ref id="red"/></bsdf>)")),
+                  "cyclic reference");
+  expect_contains(
+      error_of(lit3(kRedShape + R"(<bsdf type="twosided" id="red"><ref id="red"/></bsdf>)")),
+      "cyclic reference");
+}
+
+TEST(Ids, ARefOfTheWrongKindStaysAnError) {
+  expect_contains(error_of(lit3(kRedShape + R"(<shape type="disk" id="red"/>)")), "'red'");
+}
+
+TEST(Ids, AliasesAreSecondNames) {
+  const std::string definition = R"(<bsdf type="diffuse" id="a"/><alias id="a" as="red"/>)";
+  const SceneDirectory directory;
+  EXPECT_EQ(directory.load(lit(definition + kRedShape)).scene.bsdfs().size(), 1U);
+  expect_contains(error_of(lit(R"(<alias id="none" as="red"/>)")), "nothing has the id 'none'");
+  expect_contains(error_of(lit(definition + R"(<alias id="a" as="red"/>)")), "already taken");
+}
+
+// --- Files ---------------------------------------------------------------------------------------
+
+TEST(Files, AreLookedForInPathsAndBesideTheFileThatNamesThem) {
+  const SceneDirectory directory;
+  std::filesystem::create_directories(directory.path() / "meshes");
+  std::filesystem::create_directories(directory.path() / "parts");
+  const std::string triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  directory.write("meshes/a.obj", triangle);
+  directory.write("parts/b.obj", triangle);
+  const auto mesh = [](const std::string& file) {
+    return R"(<shape type="obj"><string name="filename" value=")" + file + R"("/></shape>)";
+  };
+  directory.write("parts/part.xml", mitsuba3(mesh("b.obj")));
+  const LoadedScene loaded = directory.load(
+      lit3(R"(<path value="meshes"/><include filename="parts/part.xml"/>)" + mesh("a.obj")));
+  EXPECT_EQ(loaded.scene.shapes().size(), 2U);
+  expect_contains(error_of(lit3(R"(<path value="absent"/>)")), "absent");
+}
+
+// --- Colours -------------------------------------------------------------------------------------
+
+Rgbd reflectance(const std::string& element, bool newer) {
+  const std::string shape =
+      R"(<shape type="sphere"><bsdf type="diffuse">)" + element + "</bsdf></shape>";
+  return std::get<Diffuse>(first_bsdf(newer ? lit3(shape) : lit(shape))).reflectance.color;
+}
+
+TEST(Spectra, ReflectDaylightInMitsuba3) {
+  const std::string flat = R"(<spectrum name="reflectance" value="300:0.5, 900:0.5"/>)";
+  expect_near(reflectance(flat, true), Rgbd(0.5, 0.5, 0.5), 1e-3);
+  expect_near(reflectance(flat, false), Rgbd(0.6024, 0.4742, 0.4547), 1e-3);
+}
+
+TEST(Spectra, AreLightInEmitters) {
+  const auto radiance = [](const std::string& element, bool newer) {
+    const std::string emitter = R"(<emitter type="constant">)" + element + "</emitter>";
+    const SceneDirectory directory;
+    const LoadedScene loaded = directory.load(newer ? mitsuba3(emitter + kSensor + kShape)
+                                                    : test::with_sensor(emitter + kShape));
+    return std::get<ConstantEnvironment>(loaded.scene.emitters()[0]).radiance;
+  };
+  const Rgbd pink(1.2049, 0.9483, 0.9093);
+  const std::string list = R"(<spectrum name="radiance" value="300:1, 900:1"/>)";
+  expect_near(radiance(list, true), pink, 1e-3);
+  const std::string uniform = R"(<spectrum name="radiance" value="2"/>)";
+  expect_near(radiance(uniform, true), Rgbd(2.0 * pink), 1e-3);
+  expect_near(radiance(uniform, false), Rgbd(2, 2, 2));
+  expect_near(radiance(R"(<rgb name="radiance" value="2"/>)", true), Rgbd(2, 2, 2));
+  // A black body of 5000 K peaks at 12.8 kW / (m^2 sr nm); it is yellowish, and 6504 K nearly
+  // white.
+  const Rgbd warm = radiance(R"(<blackbody name="radiance" temperature="5000K"/>)", false);
+  EXPECT_GT(luminance<double>(warm), 10e3);
+  EXPECT_LT(luminance<double>(warm), 12.8e3);
+  EXPECT_GT(warm.x(), warm.y());
+  EXPECT_GT(warm.y(), warm.z());
+  const Rgbd white = radiance(
+      R"(<spectrum type="blackbody" name="radiance"><float name="temperature" value="6504"/>
+         </spectrum>)",
+      true);
+  EXPECT_NEAR(white.x() / white.y(), 1.0, 0.08);
+  EXPECT_NEAR(white.z() / white.y(), 1.0, 0.08);
+  expect_near(radiance(R"(<blackbody name="radiance" temperature="5000" scale="2"/>)", false),
+              Rgbd(2.0 * warm), 1e-6);
+}
+
+TEST(Spectra, HaveTypesInMitsuba3) {
+  expect_near(reflectance(R"(<spectrum type="uniform" name="reflectance">
+      <float name="value" value="0.3"/></spectrum>)",
+                          true),
+              Rgbd(0.3, 0.3, 0.3));
+  expect_near(reflectance(R"(<spectrum type="regular" name="reflectance">
+      <float name="wavelength_min" value="300"/><float name="wavelength_max" value="900"/>
+      <string name="values" value="0.5, 0.5, 0.5"/></spectrum>)",
+                          true),
+              Rgbd(0.5, 0.5, 0.5), 1e-3);
+  expect_near(reflectance(R"(<spectrum type="irregular" name="reflectance">
+      <string name="wavelengths" value="300, 400, 900"/>
+      <string name="values" value="0.5, 0.5, 0.5"/></spectrum>)",
+                          true),
+              Rgbd(0.5, 0.5, 0.5), 1e-3);
+  expect_near(reflectance(R"(<float name="reflectance" value="0.25"/>)", true),
+              Rgbd(0.25, 0.25, 0.25));
+}
+
+TEST(Spectra, AreReadFromFiles) {
+  const SceneDirectory directory;
+  directory.write("grey.spd", "# nm value\n300 0.5\n\n900 0.5  # the end\n");
+  const auto color = [&](const std::string& file) {
+    const LoadedScene loaded = directory.load(lit3(
+        R"(<shape type="sphere"><bsdf type="diffuse"><spectrum name="reflectance" filename=")" +
+        file + R"("/></bsdf></shape>)"));
+    return std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance.color;
+  };
+  expect_near(color("grey.spd"), Rgbd(0.5, 0.5, 0.5), 1e-3);
+  directory.write("bad.spd", "300 0.5 1\n");
+  EXPECT_THROW(color("bad.spd"), SceneError);
+  EXPECT_THROW(color("absent.spd"), SceneError);
+}
+
+TEST(Spectra, SayWhatIsWrong) {
+  const auto bad = [](const std::string& element) {
+    return error_of(
+        lit3(R"(<shape type="sphere"><bsdf type="diffuse">)" + element + "</bsdf></shape>"));
+  };
+  expect_contains(bad(R"(<spectrum name="reflectance"/>)"), "'value' or 'filename'");
+  expect_contains(bad(R"(<spectrum type="lamp" name="reflectance"/>)"), "irregular");
+  expect_contains(bad(R"(<spectrum type="irregular" name="reflectance">
+      <string name="wavelengths" value="300"/><string name="values" value="1, 2"/></spectrum>)"),
+                  "as many");
+  expect_contains(bad(R"(<blackbody name="reflectance" temperature="0K"/>)"), "kelvin");
+}
+
+// --- What is replaced ----------------------------------------------------------------------------
+
+TEST(Substitutes, AreNamed) {
+  const auto notices = [](const std::string& film_content, const std::string& sensor_content) {
+    const SceneDirectory directory;
+    const std::string sensor = R"(<sensor type="perspective">)" + sensor_content +
+                               R"(<film type="hdrfilm">)" + film_content + "</film></sensor>";
+    return directory.load(test::scene_file(sensor + kEmitter + kShape)).notices;
+  };
+  EXPECT_TRUE(notices(R"(<rfilter type="box"/>)", "").empty());
+  ASSERT_EQ(notices("", "").size(), 1U);
+  expect_contains(notices("", "")[0], "'gaussian'");
+  const std::string other = R"(<rfilter type="mitchell"><float name="B" value="0.3"/></rfilter>)";
+  ASSERT_EQ(notices(other, "").size(), 1U);
+  expect_contains(notices(other, "")[0], "rfilter 'mitchell' is not used");
+  const std::string wide = R"(<rfilter type="box"><float name="radius" value="2"/></rfilter>)";
+  EXPECT_EQ(notices(wide, "").size(), 1U);
+  const std::vector<std::string> sampler =
+      notices(R"(<rfilter type="box"/>)",
+              R"(<sampler type="ldsampler"><integer name="sampleCount" value="48"/></sampler>)");
+  ASSERT_EQ(sampler.size(), 1U);
+  expect_contains(sampler[0], "sampler 'ldsampler'");
+  expect_contains(sampler[0], "--spp 48");
+}
+
+TEST(Substitutes, NestedIntegratorsGiveTheirDepth) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(mitsuba3(R"(<integrator type="aov">
+      <integrator type="path"><integer name="max_depth" value="6"/></integrator></integrator>)" +
+                                                     kSensor + kEmitter + kShape));
+  EXPECT_EQ(loaded.max_depth, 6);
+  ASSERT_EQ(loaded.notices.size(), 1U);
+  expect_contains(loaded.notices[0], "integrator 'aov' is not driftlight's; only its max_depth");
+}
+
+// --- What grows ----------------------------------------------------------------------------------
+
+TEST(Growth, OfTextIsBounded) {
+  std::string body = R"(<default name="a0" value="xxxxxxxx"/>)";
+  for (int i = 1; i < 40; ++i)
+    body += fmt::format(R"(<default name="a{}" value="$a{}$a{}"/>)", i, i - 1, i - 1);
+  expect_contains(error_of(complete(body)), "longer than 65536 characters");
+}
+
+TEST(Growth, OfIncludesIsBounded) {
+  const SceneDirectory directory;
+  for (int i = 0; i < 12; ++i) {
+    const std::string include = fmt::format(R"(<include filename="part{}.xml"/>)", i + 1);
+    directory.write(fmt::format("part{}.xml", i), test::scene_file(include + include));
+  }
+  directory.write("part12.xml", test::scene_file(""));
+  try {
+    directory.load(complete(R"(<include filename="part0.xml"/>)"));
+    FAIL() << "included 8191 files";
+  } catch (const SceneError& error) {
+    expect_contains(error.what(), "more than 1000 files");
+  }
+}
+
+TEST(Growth, OfNoticesIsBounded) {
+  std::string body;
+  for (int i = 0; i < 300; ++i) body += "<foreign/>";
+  const SceneDirectory directory;
+  EXPECT_EQ(directory.load(complete(body)).notices.size(), 201U);
+}
+
+}  // namespace
+}  // namespace driftlight
