@@ -36,8 +36,10 @@ double FamilyTiles::luminance_of_fewer(double families, const Image& particles) 
   double sum = 0.0;
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
+      if (!(effective(x, y) < families)) continue;
       const float* rgb = particles.pixel(x, y);
-      if (effective(x, y) < families) sum += luminance(Rgbd(rgb[0], rgb[1], rgb[2]));
+      sum += luminance(Rgbd(static_cast<double>(rgb[0]), static_cast<double>(rgb[1]),
+                            static_cast<double>(rgb[2])));
     }
   }
   return sum / (static_cast<double>(width_) * static_cast<double>(height_));

@@ -123,10 +123,10 @@ std::string Properties::choice(std::string_view name, const std::string& fallbac
 }
 
 Rgbd Properties::color(std::string_view name, const Rgbd& fallback) {
-  static const std::vector<std::string> kTags{"rgb", "srgb", "spectrum", "blackbody"};
-  static const std::vector<std::string> kTags3{"rgb",       "srgb",  "spectrum",
+  static const std::vector<std::string> tags_06{"rgb", "srgb", "spectrum", "blackbody"};
+  static const std::vector<std::string> tags_3{"rgb",       "srgb",  "spectrum",
                                                "blackbody", "float", "integer"};
-  const auto child = find(name, dialect() == Dialect::Mitsuba3 ? kTags3 : kTags);
+  const auto child = find(name, dialect() == Dialect::Mitsuba3 ? tags_3 : tags_06);
   return child ? read_color(*child) : fallback;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "search_path.h"
 
+#include <ranges>
 #include <system_error>
 
 namespace driftlight {
@@ -10,8 +11,8 @@ std::filesystem::path SearchPath::find(const std::string& name,
   // Without an error_code, a name that is too long for the system would end the program.
   std::error_code ignored;
   if (std::filesystem::exists(own / name, ignored)) return own / name;
-  for (auto directory = directories_.rbegin(); directory != directories_.rend(); ++directory)
-    if (std::filesystem::exists(*directory / name, ignored)) return *directory / name;
+  for (const std::filesystem::path& directory : directories_ | std::views::reverse)
+    if (std::filesystem::exists(directory / name, ignored)) return directory / name;
   return directories_.front() / name;
 }
 

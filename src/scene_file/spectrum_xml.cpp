@@ -74,8 +74,8 @@ Rgbd read_spectrum_file(const Element& element) {
 /// Equal energy is not white light to Mitsuba 3, but for surfaces it means grey.
 Rgbd uniform(const Element& element, double value) {
   const bool emits = element.dialect() == Dialect::Mitsuba3 && element.parent_tag() == "emitter";
-  static const Rgbd kEqualEnergy = spectrum_to_rgb({{300.0, 1.0}, {900.0, 1.0}});
-  return value * (emits ? kEqualEnergy : kWhite);
+  static const Rgbd equal_energy = spectrum_to_rgb({{300.0, 1.0}, {900.0, 1.0}});
+  return value * (emits ? equal_energy : kWhite);
 }
 
 Rgbd read_uniform(Properties& properties) {
