@@ -12,6 +12,7 @@
 namespace driftlight {
 namespace {
 
+using test::expect_contains;
 using test::expect_near;
 using test::lit;
 using test::SceneDirectory;
@@ -52,10 +53,6 @@ std::string mesh_error(const std::string& type, const std::string& file,
   }
   ADD_FAILURE() << "loaded without an error";
   return {};
-}
-
-void expect_contains(const std::string& text, const std::string& fragment) {
-  EXPECT_NE(text.find(fragment), std::string::npos) << "no \"" << fragment << "\" in: " << text;
 }
 
 Eigen::Vector3f winding_normal(const TriangleMesh& mesh, std::size_t triangle) {

@@ -11,6 +11,7 @@
 namespace driftlight {
 namespace {
 
+using test::expect_contains;
 using test::expect_near;
 using test::lit;
 using test::SceneDirectory;
@@ -28,17 +29,7 @@ TriangleMesh load_mesh(const std::string& file, const std::string& content = "")
 }
 
 std::string error_of(const std::string& file) {
-  try {
-    load_ply(file);
-  } catch (const SceneError& error) {
-    return error.what();
-  }
-  ADD_FAILURE() << "loaded without an error";
-  return {};
-}
-
-void expect_contains(const std::string& text, const std::string& fragment) {
-  EXPECT_NE(text.find(fragment), std::string::npos) << "no \"" << fragment << "\" in: " << text;
+  return test::scene_error([&] { load_ply(file); });
 }
 
 std::string header(const std::string& format, const std::string& vertex_properties, int vertices,

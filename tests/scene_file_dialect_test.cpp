@@ -13,6 +13,7 @@ namespace driftlight {
 namespace {
 
 using test::complete;
+using test::expect_contains;
 using test::expect_near;
 using test::kEmitter;
 using test::kSensor;
@@ -29,17 +30,7 @@ std::string lit3(const std::string& body) { return mitsuba3(body + kSensor + kEm
 
 std::string error_of(const std::string& scene) {
   const SceneDirectory directory;
-  try {
-    directory.load(scene);
-  } catch (const SceneError& error) {
-    return error.what();
-  }
-  ADD_FAILURE() << "loaded without an error";
-  return {};
-}
-
-void expect_contains(const std::string& text, const std::string& fragment) {
-  EXPECT_NE(text.find(fragment), std::string::npos) << "no \"" << fragment << "\" in: " << text;
+  return test::scene_error([&] { directory.load(scene); });
 }
 
 Bsdf first_bsdf(const std::string& scene) {

@@ -8,6 +8,7 @@
 namespace driftlight {
 namespace {
 
+using test::expect_contains;
 using test::expect_near;
 using test::kEmitter;
 using test::kSensor;
@@ -16,17 +17,7 @@ using test::SceneDirectory;
 
 std::string error_of(const std::string& body) {
   const SceneDirectory directory;
-  try {
-    directory.load(lit(body));
-  } catch (const SceneError& error) {
-    return error.what();
-  }
-  ADD_FAILURE() << "loaded without an error";
-  return {};
-}
-
-void expect_contains(const std::string& text, const std::string& fragment) {
-  EXPECT_NE(text.find(fragment), std::string::npos) << "no \"" << fragment << "\" in: " << text;
+  return test::scene_error([&] { directory.load(lit(body)); });
 }
 
 std::string transform(const std::string& steps) {

@@ -9,6 +9,7 @@
 namespace driftlight {
 namespace {
 
+using test::expect_contains;
 using test::expect_near;
 using test::SceneDirectory;
 
@@ -43,17 +44,7 @@ std::string bitmap(const std::string& content) {
 }
 
 std::string error_of(const std::string& element, const std::string& version = "0.6.0") {
-  try {
-    load(element, version);
-  } catch (const SceneError& error) {
-    return error.what();
-  }
-  ADD_FAILURE() << "loaded without an error";
-  return {};
-}
-
-void expect_contains(const std::string& text, const std::string& fragment) {
-  EXPECT_NE(text.find(fragment), std::string::npos) << "no \"" << fragment << "\" in: " << text;
+  return test::scene_error([&] { load(element, version); });
 }
 
 TEST(BitmapXml, ReadsWrapModes) {

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <string>
 
+#include "driftlight/error.h"
 #include "driftlight/scene_file.h"
 
 namespace driftlight::test {
@@ -67,6 +68,22 @@ inline std::string lit(const std::string& body) { return with_sensor(body + kEmi
 
 /// A scene of the body, a sensor, an emitter and a shape: complete whatever the body is.
 inline std::string complete(const std::string& body) { return lit(body + kShape); }
+
+inline void expect_contains(const std::string& text, const std::string& fragment) {
+  EXPECT_NE(text.find(fragment), std::string::npos) << "no \"" << fragment << "\" in: " << text;
+}
+
+/// What the error says that this ends in; fails if there is none.
+template <class Load>
+std::string scene_error(const Load& load) {
+  try {
+    load();
+  } catch (const SceneError& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "loaded without an error";
+  return {};
+}
 
 /// For vectors and colours, by their distance.
 template <class Vector>
