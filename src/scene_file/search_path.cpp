@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "search_path.h"
 
-#include <ranges>
+#include <algorithm>
 #include <system_error>
 
 namespace driftlight {
@@ -11,9 +11,10 @@ std::filesystem::path SearchPath::find(const std::string& name,
   // Without an error_code, a name that is too long for the system would end the program.
   std::error_code ignored;
   if (std::filesystem::exists(own / name, ignored)) return own / name;
-  for (const std::filesystem::path& directory : directories_ | std::views::reverse)
-    if (std::filesystem::exists(directory / name, ignored)) return directory / name;
-  return directories_.front() / name;
+  const auto found = std::find_if(
+      directories_.rbegin(), directories_.rend(),
+      [&](const auto& directory) { return std::filesystem::exists(directory / name, ignored); });
+  return (found != directories_.rend() ? *found : directories_.front()) / name;
 }
 
 }  // namespace driftlight
