@@ -300,6 +300,12 @@ TEST_F(CompareCli, CountsTheFamiliesOfSplitting) {
 }
 
 TEST_F(CompareCli, StudiesTheTermsOfTheStep) {
+  // A floor too: chains have only indirect light to mutate.
+  std::string floor = kScene;
+  floor.replace(floor.find("</scene>"), 8,
+                R"(<shape type="rectangle"><transform name="toWorld"><scale value="4"/>
+<rotate x="1" angle="-90"/><translate y="-1"/></transform></shape></scene>)");
+  std::ofstream(folder() / "scene.xml") << floor;
   render_reference();
   const Outcome outcome = compare({"--study", "terms", "--reference", "reference.exr", "--time",
                                    "0.05", "--mutations-per-pixel", "4", "--runs", "2"});
