@@ -23,7 +23,7 @@ constexpr double kMostSpread = 0.9;
 /// family covers, and needs no second sample.
 constexpr double kWorth = 20.0;
 /// Least noise to be saved, in units of the squared brightness: that of the samples themselves is
-/// about 1.
+/// about 1. What is saved must also outweigh the time that splitting takes of the samples.
 constexpr double kLeastSaving = 0.05;
 /// Least deposit of a visit, in units of the brightness of a pixel's sample: below it more visits
 /// no longer pay. Most deposit of a particle.
@@ -137,8 +137,11 @@ void leave_out_levels(const std::vector<LevelFigures>& figures, TemperedScenes& 
   }
 }
 
-/// Deposit and rate, from a run by the plan as it is.
-void set_effort(const PilotRun& run, double samples, int last_steps, SplittingPlan& plan) {
+/// Deposit and rate, from a run by the plan as it is. With v the noise of a sample of the top
+/// level, c its cost and r the rate, noise times time is (1 + v / r) (1 + r c) of that of samples
+/// without noise of theirs in what is left to splitting; r = sqrt(v / c) makes the least of it,
+/// which is returned.
+double set_effort(const PilotRun& run, double samples, int last_steps, SplittingPlan& plan) {
   const double a = run.alone / (samples * plan.deposit);
   const double b = (run.pixels - run.alone) / samples;
   // Work per deposit does not depend on it.
@@ -147,7 +150,9 @@ void set_effort(const PilotRun& run, double samples, int last_steps, SplittingPl
   const double least = kLeastDeposit * last_steps;
   plan.deposit = std::clamp(best, least, std::max(least, kMostDeposit));
   const double noise = a * plan.deposit + b;
-  plan.rate = std::clamp(std::sqrt(noise / (1.0 + work / plan.deposit)), kFewest, kMost);
+  const double cost = 1.0 + work / plan.deposit;
+  plan.rate = std::clamp(std::sqrt(noise / cost), kFewest, kMost);
+  return (1.0 + noise / plan.rate) * (1.0 + plan.rate * cost);
 }
 
 }  // namespace
@@ -175,9 +180,12 @@ SplittingPlan plan_splitting(TemperedScenes& scenes, const Splitter& prototype,
     leave_out_levels(run(pilot, plan, samples, samples).levels, scenes);
   plan.deposit = kLightDeposit;
   // Twice, as a sample starts only so many particles: one of great weight hides what it costs.
+  double noise = 0.0;
   for (std::uint64_t round = 2; round <= 3; ++round)
-    set_effort(run(pilot, plan, round * samples, samples), count, options.splitting.last_steps,
-               plan);
+    noise = set_effort(run(pilot, plan, round * samples, samples), count,
+                       options.splitting.last_steps, plan);
+  // Sequences that are cheap to split one by one may cost more than they save all the same.
+  if (!options.splitting.all && noise > 1.0 + saved / (kWorth * count)) return {};
   return plan;
 }
 
