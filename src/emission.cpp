@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "driftlight/walk.h"
+#include "emission_warp.h"
 
 namespace driftlight {
 namespace {
@@ -18,37 +19,20 @@ Emission leave_area(const Scene& scene, const LightEnd& end, const Vec3d& v, dou
   return {end, end.p, scene.leave(end.p, end.n, v), v, cosine, 1.0};
 }
 
-/// Points of a sphere seen along v are drawn by their place across it, uniformly on a disk: the
-/// direction is uniform, and the point has density cos / (pi R^2). That is the density of a uniform
-/// point with a direction by the cosine, cos / (4 pi^2 R^2).
-Emission emit_from_sphere(const Scene& scene, std::uint32_t emitter, const Sphere& sphere,
-                          const EmissionSample& u) {
-  const Vec3d v = square_to_sphere(u[0], u[1]);
-  const Vec2d disk = square_to_disk(u[2], u[3]);
-  const double cosine = std::sqrt(std::max(0.0, 1.0 - disk.squaredNorm()));
-  const double side = sphere.flip_normals ? -1.0 : 1.0;
-  const Vec3d n = to_world({disk.x(), disk.y(), side * cosine}, v);
-  const LightEnd end = area_end(scene, emitter, {sphere.center + sphere.radius * n, side * n});
-  return leave_area(scene, end, v, cosine);
-}
-
 Emission emit_from_area(const Scene& scene, std::uint32_t emitter, const EmissionSample& u) {
   const auto& light = std::get<AreaEmitter>(scene.emitters()[emitter]);
-  const LightEnd end = area_end(scene, emitter, scene.sample_area(light, u[0], u[1]));
-  const Vec3d local = square_to_cosine_hemisphere(u[2], u[3]);
-  return leave_area(scene, end, to_world(local, end.n), local.z());
+  const EmittedRay<double> ray = warp_emission_from_area(scene.shapes()[light.shape], u);
+  return leave_area(scene, area_end(scene, emitter, ray.from), ray.direction, ray.cosine);
 }
 
-Emission emit_from_point(const LightEnd& end, const EmissionSample& u) {
-  const Vec3d v = end.spot == nullptr ? square_to_sphere(u[2], u[3]) : end.spot->sample(u[2], u[3]);
+Emission emit_from_point(const Scene& scene, const LightEnd& end, const EmissionSample& u) {
+  const Vec3d v = warp_emission_from_point(scene.emitters()[end.emitter], u).direction;
   return {end, end.p, end.p, v, 1.0, end.falloff(v)};
 }
 
-/// From the disk that touches the bounding sphere, across the ray.
 Emission emit_from_infinity(const Scene& scene, const LightEnd& end, const EmissionSample& u) {
-  const Vec2d disk = square_to_disk(u[2], u[3]);
-  const Vec3d origin = scene.center() + scene.radius() * to_world({disk.x(), disk.y(), 1.0}, end.p);
-  return {end, origin, origin, -end.p, 1.0, 1.0};
+  const EmittedRay<double> ray = warp_emission_from_infinity(scene, end.p, u);
+  return {end, ray.from.p, ray.from.p, -end.p, 1.0, 1.0};
 }
 
 }  // namespace
@@ -64,11 +48,9 @@ EmissionAxes invertible_axes(const Scene& scene, std::uint32_t index) {
 
 Emission emit(const Scene& scene, std::uint32_t index, const EmissionSample& u) {
   const Emitter& emitter = scene.emitters()[index];
-  if (const Sphere* sphere = sphere_of(scene, emitter))
-    return emit_from_sphere(scene, index, *sphere, u);
   if (std::holds_alternative<AreaEmitter>(emitter)) return emit_from_area(scene, index, u);
   const LightEnd end = light_end_from(scene, index, {u[0], u[1]});
-  return end.at_infinity() ? emit_from_infinity(scene, end, u) : emit_from_point(end, u);
+  return end.at_infinity() ? emit_from_infinity(scene, end, u) : emit_from_point(scene, end, u);
 }
 
 EmissionSample emission_sample(const Scene& scene, std::uint32_t index, const Vec3d& p,

@@ -51,8 +51,7 @@ double SpotEmitter::integral(double theta) const {
   return in_beam + sum * inverse_transition_;
 }
 
-Vec3d SpotEmitter::sample(double u1, double u2) const {
-  const double share = u1 * 0.5 * kInvPi * solid_angle_;
+double SpotEmitter::angle_of_share(double share) const {
   const double in_beam = integral(beam_width_);
   // Rounding must not carry a direction to the rim, where the density is 0.
   const double most = (1.0 - 1e-12) * cutoff_;
@@ -72,10 +71,7 @@ Vec3d SpotEmitter::sample(double u1, double u2) const {
       theta = inside ? next : 0.5 * (low + high);
     }
   }
-  theta = std::min(theta, most);
-  const double phi = 2.0 * kPi * u2;
-  const double sine = std::sin(theta);
-  return to_world({sine * std::cos(phi), sine * std::sin(phi), std::cos(theta)}, axis_);
+  return std::min(theta, most);
 }
 
 Vec2d SpotEmitter::inverse(const Vec3d& v) const {
@@ -147,17 +143,6 @@ double EnvironmentMap::patch_solid_angle(int row) const {
 
 int EnvironmentMap::row_of(double y) const {
   return std::clamp(static_cast<int>(std::floor(y + 0.5)), 0, bitmap_.height);
-}
-
-Vec3d EnvironmentMap::sample(double u1, double u2) const {
-  const int row = rows_.sample(u1);
-  const int column = columns_[static_cast<std::size_t>(row)].sample(u2);
-  const auto r = static_cast<std::size_t>(row);
-  const double y = edges_[r] + u1 * (edges_[r + 1] - edges_[r]);
-  const double sine = std::sqrt(std::max(0.0, 1.0 - y * y));
-  const double phi = 2.0 * kPi * (column + 0.5 + u2) / bitmap_.width;
-  return (sine * std::sin(phi) * axis_x_ + y * axis_y_ - sine * std::cos(phi) * axis_z_)
-      .normalized();
 }
 
 EnvironmentMap::Place EnvironmentMap::place_of(const Vec3d& d) const {

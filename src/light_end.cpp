@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "emission_warp.h"
+
 namespace driftlight {
 namespace {
 
@@ -65,10 +67,8 @@ LightEnd sample_light_end(const Scene& scene, Rng& rng) {
 
 LightEnd light_end_from(const Scene& scene, std::uint32_t index, const Vec2d& square) {
   const Emitter& emitter = scene.emitters()[index];
-  if (const auto* map = std::get_if<EnvironmentMap>(&emitter))
-    return environment_end(scene, index, map->sample(square.x(), square.y()));
   if (is_environment(emitter))
-    return environment_end(scene, index, square_to_sphere(square.x(), square.y()));
+    return environment_end(scene, index, warp_environment(emitter, square.x(), square.y()));
   if (const auto* light = std::get_if<AreaEmitter>(&emitter))
     return area_end(scene, index, scene.sample_area(*light, square.x(), square.y()));
   return delta_end(scene, index);

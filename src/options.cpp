@@ -206,6 +206,48 @@ std::vector<OptionEntry> entries(PrimaryOptions& options) {
   };
 }
 
+namespace {
+
+/// Those of MMLT, and behind the first `more`.
+std::vector<OptionEntry> gaussian_step_entries(GaussianStepOptions& options,
+                                               std::vector<OptionEntry> more) {
+  std::vector<OptionEntry> result = entries(static_cast<PrimaryOptions&>(options));
+  more.insert(more.begin(),
+              number("isotropic_probability", options.isotropic_probability, Range<double>{0, 1},
+                     "share of the small steps that are those of mmlt, which alone change the "
+                     "strategy"));
+  result.insert(result.begin() + 1, more.begin(), more.end());
+  return result;
+}
+
+OptionEntry sigma_entry(double& sigma) {
+  return number("sigma", sigma, Range<double>{.low = 0, .high = 1, .open = true},
+                "standard deviation of the isotropic prior of a small step");
+}
+
+}  // namespace
+
+std::vector<OptionEntry> entries(H2mcOptions& options) {
+  return gaussian_step_entries(options, {sigma_entry(options.sigma)});
+}
+
+std::vector<OptionEntry> entries(LmcOptions& options) {
+  return gaussian_step_entries(
+      options,
+      {number("step", options.step, Range<double>{.low = 0, .high = 10, .open = true}, "time step"),
+       sigma_entry(options.sigma),
+       number("gradient_bound", options.gradient_bound,
+              Range<double>{.low = 0, .high = 1e9, .open = true},
+              "length to which longer gradients are cut"),
+       number("momentum", options.momentum, Range<double>{0, 1},
+              "weight of former gradients in the drift at first"),
+       number("locality", options.locality, Range<double>{0, 1},
+              "weight of the current gradient in the preconditioner"),
+       number("adaptation_decay", options.adaptation_decay,
+              Range<double>{.low = 0, .high = 1, .open = true},
+              "the t-th gradient weighs t^-adaptation_decay among former ones")});
+}
+
 std::string_view name_of(PhaseSpace phase_space) {
   return kPhaseSpaces.at(static_cast<std::size_t>(phase_space));
 }
@@ -236,6 +278,18 @@ void PrimaryOptions::validate() const {
   if (step_min > step_max)
     throw OptionError(
         fmt::format("option step_min = '{}': must be at most step_max = {}", step_min, step_max));
+}
+
+void H2mcOptions::validate() const {
+  PrimaryOptions::validate();
+  H2mcOptions copy = *this;
+  check(entries(copy));
+}
+
+void LmcOptions::validate() const {
+  PrimaryOptions::validate();
+  LmcOptions copy = *this;
+  check(entries(copy));
 }
 
 void set_option(const std::vector<OptionEntry>& entries, const std::string& name,

@@ -2,17 +2,14 @@
 /// A Metropolis chain in primary sample space.
 #pragma once
 
-#include <vector>
-
 #include "driftlight/film.h"
 #include "driftlight/render.h"
 #include "driftlight/running_mean.h"
-#include "primary_target.h"
+#include "primary_deposits.h"
 
 namespace driftlight {
 
-/// Mutations are symmetric, so a move from u to u' is accepted with probability I(u') / I(u). Both
-/// points put what they carry on the film, over I, with weights 1 - a and a.
+/// Mutations are symmetric, so a move from u to u' is accepted with probability I(u') / I(u).
 class PrimaryChain {
  public:
   /// Starts at a point that carries light.
@@ -21,7 +18,7 @@ class PrimaryChain {
 
   void run(std::uint64_t mutations);
   /// Deposits what the current point has gathered since it was entered.
-  void flush();
+  void flush() { deposits_.flush(); }
 
   const LangevinStatistics& statistics() const { return statistics_; }
   int edges() const { return point_.edges; }
@@ -29,21 +26,11 @@ class PrimaryChain {
   const RunningMean& weights() const { return weights_; }
 
  private:
-  struct Place {
-    std::vector<PrimarySplat> splats;
-    double target = 0;
-  };
-
-  void splat(const Place& place, double weight);
-
   PrimaryTarget target_;
   double large_step_probability_;
-  Film& film_;
+  PrimaryDeposits deposits_;
   Rng rng_;
   PrimaryPoint point_;
-  Place current_;
-  Place proposed_;
-  double gathered_ = 0;
   LangevinStatistics statistics_;
   RunningMean weights_;
 };

@@ -11,6 +11,7 @@
 
 #include "chain_run.h"
 #include "driftlight/render.h"
+#include "gaussian_chain.h"
 #include "primary_chain.h"
 #include "systematic_resampling.h"
 
@@ -19,18 +20,72 @@ namespace {
 
 using Strategies = PrimaryTarget::Strategies;
 
+/// Points of PrimaryTarget, and chains of them.
+class PointSampler {
+ public:
+  using Point = PrimaryPoint;
+  using Chain = PrimaryChain;
+
+  PointSampler(const PrimaryTarget& target, const PrimaryOptions& options)
+      : target_(target), options_(options) {}
+
+  Point point(std::uint64_t seed, std::size_t i, int edges) const {
+    Point result(options_, seed, Stream::Bootstrap, i);
+    result.edges = edges;
+    return result;
+  }
+  double target(Point& point) { return target_(point, splats_); }
+  std::unique_ptr<Chain> chain(const Point& start, Film& film, const Rng& rng) const {
+    return std::make_unique<Chain>(target_, options_, film, start, rng);
+  }
+
+ private:
+  PrimaryTarget target_;
+  const PrimaryOptions& options_;
+  std::vector<PrimarySplat> splats_;
+};
+
+/// Likewise of StrategyTarget.
+class NumbersSampler {
+ public:
+  using Point = StrategyNumbers;
+  using Chain = GaussianChain;
+
+  NumbersSampler(const StrategyTarget& target, const GaussianMethod& method)
+      : target_(target), method_(method) {}
+
+  static Point point(std::uint64_t seed, std::size_t i, int edges) {
+    Rng rng(seed, Stream::Bootstrap, i);
+    return {edges, rng};
+  }
+  double target(Point& point) {
+    target_(point, place_);
+    return place_.target;
+  }
+  std::unique_ptr<Chain> chain(const Point& start, Film& film, const Rng& rng) const {
+    return std::make_unique<Chain>(target_, method_, film, start, rng);
+  }
+
+ private:
+  StrategyTarget target_;
+  const GaussianMethod& method_;
+  PrimaryPlace place_;
+};
+
 /// The chains with what they are started from.
+template <class Sampler>
 class PrimaryChains {
  public:
+  using Chain = typename Sampler::Chain;
+
   /// No chains if paths of `min_edges` and more carry no light.
-  PrimaryChains(const Scene& scene, const PrimaryOptions& options, Strategies strategies,
+  PrimaryChains(const Sampler& sampler, const PrimaryOptions& options, Strategies strategies,
                 int min_edges, std::uint64_t seed, Film& film)
-      : options_(options),
+      : sampler_(sampler),
+        options_(options),
         seed_(seed),
         strategies_(strategies),
-        min_edges_(min_edges),
-        unguided_(scene),
-        target_(scene, unguided_, strategies, min_edges, options.max_depth) {
+        min_edges_(min_edges) {
     if (min_edges > options.max_depth) return;
     bootstrap_weights_.resize(strategies == Strategies::One
                                   ? static_cast<std::size_t>(options.max_depth - min_edges) + 1
@@ -41,13 +96,8 @@ class PrimaryChains {
     if (!(bootstrap_mean() > 0.0)) return;
     Rng rng(seed, Stream::Resampling, 0);
     for (const std::size_t i : systematic_resampling(values, options.chains, rng.uniform()))
-      all.push_back(std::make_unique<PrimaryChain>(target_, options, film, point(i),
-                                                   Rng(seed, Stream::Chain, all.size())));
+      all.push_back(sampler_.chain(point(i), film, Rng(seed, Stream::Chain, all.size())));
   }
-
-  // The chains' targets refer to it.
-  PrimaryChains(const PrimaryChains&) = delete;
-  PrimaryChains& operator=(const PrimaryChains&) = delete;
 
   /// Deposits all that the chains have gathered.
   void flush() {
@@ -72,7 +122,7 @@ class PrimaryChains {
   /// Of the target over all lengths, as the bootstrap has found it.
   double bootstrap_mean() const { return integral(bootstrap_weights_); }
 
-  std::vector<std::unique_ptr<PrimaryChain>> all;
+  std::vector<std::unique_ptr<Chain>> all;
 
  private:
   static double integral(const std::vector<RunningMean>& weights) {
@@ -80,17 +130,15 @@ class PrimaryChains {
     for (const RunningMean& length : weights) sum += length.mean();
     return sum;
   }
-  std::size_t length_index(const PrimaryChain& chain) const {
+  std::size_t length_index(const Chain& chain) const {
     return strategies_ == Strategies::One ? static_cast<std::size_t>(chain.edges() - min_edges_)
                                           : 0;
   }
 
   /// Sample i of the bootstrap, whose lengths take turns.
-  PrimaryPoint point(std::size_t i) const {
-    PrimaryPoint result(options_, seed_, Stream::Bootstrap, i);
-    if (strategies_ == Strategies::One)
-      result.edges = min_edges_ + static_cast<int>(i % bootstrap_weights_.size());
-    return result;
+  typename Sampler::Point point(std::size_t i) const {
+    const int turn = static_cast<int>(i % bootstrap_weights_.size());
+    return sampler_.point(seed_, i, strategies_ == Strategies::One ? min_edges_ + turn : 0);
   }
 
   /// The target at as many samples of each length.
@@ -100,37 +148,60 @@ class PrimaryChains {
     const auto wanted = static_cast<std::size_t>(options_.bootstrap);
     std::vector<double> values((wanted + lengths - 1) / lengths * lengths);
     tbb::parallel_for(std::size_t{0}, (values.size() + kTask - 1) / kTask, [&](std::size_t task) {
-      PrimaryTarget target = target_;
-      std::vector<PrimarySplat> splats;
+      Sampler sampler = sampler_;
       for (std::size_t i = task * kTask; i < std::min((task + 1) * kTask, values.size()); ++i) {
-        PrimaryPoint at = point(i);
-        values[i] = target(at, splats);
+        auto at = point(i);
+        values[i] = sampler.target(at);
       }
     });
     return values;
   }
 
+  Sampler sampler_;
   const PrimaryOptions& options_;
   std::uint64_t seed_;
   Strategies strategies_;
   int min_edges_;
-  EmissionGuide unguided_;
-  PrimaryTarget target_;
   std::vector<RunningMean> bootstrap_weights_;  ///< of each length, if they are apart
 };
 
+/// Runs chains of the sampler that sampler_of(min_edges) returns.
+template <class SamplerOf>
 LangevinResult render_primary(const Scene& scene, const PrimaryOptions& options,
                               const RenderOptions& render, double mutations_per_pixel,
-                              Strategies strategies) {
-  options.validate();
+                              Strategies strategies, const SamplerOf& sampler_of) {
   tbb::task_arena arena(render.threads > 0 ? render.threads : tbb::task_arena::automatic);
   return arena.execute([&] {
     return run_chains(
         scene, options.direct, options.max_depth, render, mutations_per_pixel,
         [&](int min_edges, Film& film) {
-          return PrimaryChains(scene, options, strategies, min_edges, render.seed, film);
+          return PrimaryChains(sampler_of(min_edges), options, strategies, min_edges, render.seed,
+                               film);
         },
-        [](const PrimaryChains&, LangevinResult&) {});
+        [](const auto&, LangevinResult&) {});
+  });
+}
+
+LangevinResult render_points(const Scene& scene, const PrimaryOptions& options,
+                             const RenderOptions& render, double mutations_per_pixel,
+                             Strategies strategies) {
+  options.validate();
+  const EmissionGuide unguided(scene);
+  return render_primary(
+      scene, options, render, mutations_per_pixel, strategies, [&](int min_edges) {
+        return PointSampler(
+            PrimaryTarget(scene, unguided, strategies, min_edges, options.max_depth), options);
+      });
+}
+
+template <class Options>
+LangevinResult render_by_gaussian_steps(const Scene& scene, const Options& options,
+                                        const RenderOptions& render, double mutations_per_pixel) {
+  options.validate();
+  const EmissionGuide unguided(scene);
+  const GaussianMethod method = options;
+  return render_primary(scene, options, render, mutations_per_pixel, Strategies::One, [&](int) {
+    return NumbersSampler(StrategyTarget(scene, unguided, options.max_depth), method);
   });
 }
 
@@ -138,12 +209,22 @@ LangevinResult render_primary(const Scene& scene, const PrimaryOptions& options,
 
 LangevinResult render_pssmlt(const Scene& scene, const PssmltOptions& options,
                              const RenderOptions& render, double mutations_per_pixel) {
-  return render_primary(scene, options, render, mutations_per_pixel, Strategies::All);
+  return render_points(scene, options, render, mutations_per_pixel, Strategies::All);
 }
 
 LangevinResult render_mmlt(const Scene& scene, const MmltOptions& options,
                            const RenderOptions& render, double mutations_per_pixel) {
-  return render_primary(scene, options, render, mutations_per_pixel, Strategies::One);
+  return render_points(scene, options, render, mutations_per_pixel, Strategies::One);
+}
+
+LangevinResult render_h2mc(const Scene& scene, const H2mcOptions& options,
+                           const RenderOptions& render, double mutations_per_pixel) {
+  return render_by_gaussian_steps(scene, options, render, mutations_per_pixel);
+}
+
+LangevinResult render_lmc(const Scene& scene, const LmcOptions& options,
+                          const RenderOptions& render, double mutations_per_pixel) {
+  return render_by_gaussian_steps(scene, options, render, mutations_per_pixel);
 }
 
 }  // namespace driftlight

@@ -6,6 +6,14 @@
 
 namespace driftlight {
 
+double moved(double u, const PrimaryOptions& options, Rng& rng) {
+  const double ratio = std::log(options.step_max / options.step_min);
+  const double step = options.step_max * std::exp(-ratio * rng.uniform());
+  return wrapped(rng.uniform() < 0.5 ? u + step : u - step);
+}
+
+double wrapped(double u) { return std::clamp(u - std::floor(u), 0x1p-33, 1.0 - 0x1p-33); }
+
 void PrimarySample::propose(bool large) {
   ++time_;
   large_ = large;
@@ -40,18 +48,9 @@ double PrimarySample::next() {
   if (large_)
     c.value = rng_.uniform();
   else
-    for (; c.time < time_; ++c.time) c.value = moved(c.value);
+    for (; c.time < time_; ++c.time) c.value = moved(c.value, options_, rng_);
   c.time = time_;
   return c.value;
-}
-
-double PrimarySample::moved(double u) {
-  const double ratio = std::log(options_.step_max / options_.step_min);
-  const double step = options_.step_max * std::exp(-ratio * rng_.uniform());
-  double x = rng_.uniform() < 0.5 ? u + step : u - step;
-  x -= std::floor(x);
-  // Numbers are never 0 and never 1.
-  return std::clamp(x, 0x1p-33, 1.0 - 0x1p-33);
 }
 
 }  // namespace driftlight

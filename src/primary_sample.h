@@ -10,10 +10,15 @@
 
 namespace driftlight {
 
+/// The number u, moved by a small step of Kelemen et al. 2002:
+///   +-s2 exp(-log(s2 / s1) xi),   s1 <= s2 the sizes of the options, xi uniform, modulo 1.
+double moved(double u, const PrimaryOptions& options, Rng& rng);
+/// Modulo 1, into (0, 1): numbers are never 0 and never 1.
+double wrapped(double u);
+
 /// A point of [0, 1)^infinity of which those coordinates exist that were asked for, with the
-/// mutations of Kelemen et al. 2002. A small step moves each coordinate by
-///   +-s2 exp(-log(s2 / s1) xi),   s1 <= s2 the sizes of the options, xi uniform, modulo 1;
-/// a large one draws all anew. Both are symmetric. A coordinate that was not asked for by some
+/// mutations of Kelemen et al. 2002. A small step moves each coordinate as above; a large one draws
+/// all anew. Both are symmetric. A coordinate that was not asked for by some
 /// mutations makes up for them when it is.
 class PrimarySample final : public UniformSource {
  public:
@@ -38,7 +43,6 @@ class PrimarySample final : public UniformSource {
   };
 
   void propose(bool large);
-  double moved(double u);
 
   const PrimaryOptions& options_;
   Rng rng_;

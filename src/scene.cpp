@@ -11,6 +11,7 @@
 
 #include "bsdf_textures.h"
 #include "driftlight/error.h"
+#include "emission_warp.h"
 
 namespace driftlight {
 
@@ -326,28 +327,7 @@ Vec3d Scene::leave(const Vec3d& p, const Vec3d& n_g, const Vec3d& direction) con
 }
 
 EmitterPoint Scene::sample_area(const AreaEmitter& emitter, double u1, double u2) const {
-  const Shape& shape = shapes()[emitter.shape];
-  if (const auto* sphere = std::get_if<Sphere>(&shape.geometry)) {
-    const Vec3d n = square_to_sphere(u1, u2);
-    return {sphere->center + sphere->radius * n, sphere->flip_normals ? Vec3d(-n) : n};
-  }
-  if (const auto* disk = std::get_if<Disk>(&shape.geometry)) {
-    const Vec2d s = square_to_disk(u1, u2);
-    return {disk->center + s.x() * disk->u + s.y() * disk->v, disk->u.cross(disk->v).normalized()};
-  }
-  if (const auto* cylinder = std::get_if<Cylinder>(&shape.geometry)) {
-    const double phi = 2.0 * kPi * u2;
-    const Vec3d n = cylinder->to_local.transpose() * Vec3d(std::cos(phi), std::sin(phi), 0.0);
-    const Vec3d p =
-        cylinder->base + u1 * cylinder->length * cylinder->axis() + cylinder->radius * n;
-    return {p, cylinder->flip_normals ? Vec3d(-n) : n};
-  }
-  const auto& mesh = std::get<TriangleMesh>(shape.geometry);
-  const auto i = static_cast<std::uint32_t>(shape.triangles.sample(u1));
-  const std::array<Vec3d, 3> p = corners(mesh, i);
-  const double root = std::sqrt(u1);
-  const Vec3d point = p[0] + root * (1.0 - u2) * (p[1] - p[0]) + root * u2 * (p[2] - p[0]);
-  return {point, geometric_normal(mesh, i)};
+  return warp_area<double>(shapes()[emitter.shape], u1, u2);
 }
 
 namespace {

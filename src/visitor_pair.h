@@ -16,6 +16,10 @@ struct VisitorPair : WalkVisitor<T> {
   Second second;
 
   explicit VisitorPair(First a = {}, Second b = {}) : first(std::move(a)), second(std::move(b)) {}
+  /// The second from these, where it is.
+  template <class... Arguments>
+  explicit VisitorPair(std::in_place_t, Arguments&&... arguments)
+      : second(std::forward<Arguments>(arguments)...) {}
 
   void sensor(const PerspectiveCamera& camera, const Vec3<T>& v) {
     first.sensor(camera, v);
@@ -72,6 +76,10 @@ struct VisitorPair : WalkVisitor<T> {
   void directional_emission(const DirectionalEmitter& emitter, const Vec3<T>& offset) {
     first.directional_emission(emitter, offset);
     second.directional_emission(emitter, offset);
+  }
+  void environment_emission(const Emitter& emitter, const Vec3<T>& offset, const Vec3<T>& v) {
+    first.environment_emission(emitter, offset, v);
+    second.environment_emission(emitter, offset, v);
   }
   void light_scatter(const ScatterEvent<T>& e) {
     first.light_scatter(e);

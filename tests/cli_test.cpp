@@ -105,7 +105,7 @@ const std::vector<Mistake> kRenderMistakes{
     {{"missing.xml"}, {"missing.xml"}},
     {{"broken.xml"}, {"broken.xml:"}},
     {{"scene.xml", "--integrator", "photons"},
-     {"'photons'", "langevin", "pssmlt", "mmlt", "path", "bdpt", "light"}},
+     {"'photons'", "langevin", "pssmlt", "mmlt", "h2mc", "lmc", "path", "bdpt", "light"}},
     {{"scene.xml", "--set", "speed=1"}, {"'speed'", "drift", "epsilon"}},
     {{"scene.xml", "--set", "drift=sideways"}, {"drift", "'sideways'", "none|gradient|full"}},
     {{"scene.xml", "--set", "epsilon=-1"}, {"epsilon", "'-1'", "> 0"}},
@@ -353,6 +353,8 @@ TEST_F(Cli, TheSameSeedGivesTheSameBytesOnAnyNumberOfThreads) {
       {"--integrator", "langevin", "--spp", "4"},
       {"--integrator", "pssmlt", "--mutations-per-pixel", "20"},
       {"--integrator", "mmlt", "--mutations-per-pixel", "20"},
+      {"--integrator", "h2mc", "--mutations-per-pixel", "2"},
+      {"--integrator", "lmc", "--mutations-per-pixel", "2"},
       {"--integrator", "path", "--spp", "4"},
       {"--integrator", "bdpt", "--spp", "4"},
       {"--integrator", "light", "--spp", "4"},
@@ -375,7 +377,8 @@ TEST_F(Cli, TheSameSeedGivesTheSameBytesOnAnyNumberOfThreads) {
 }
 
 TEST_F(Cli, TimeEndsTheRender) {
-  for (const char* integrator : {"langevin", "pssmlt", "mmlt", "path", "bdpt", "light"}) {
+  for (const char* integrator :
+       {"langevin", "pssmlt", "mmlt", "h2mc", "lmc", "path", "bdpt", "light"}) {
     const auto start = std::chrono::steady_clock::now();
     const Outcome outcome = run({"render", "scene.xml", "--integrator", integrator, "--time", "1",
                                  "-o", "a.exr", "--stats", "s.json"});

@@ -206,22 +206,26 @@ TEST_P(PrimaryEqualsPath, TileMeans) {
       return options;
     };
     const double amount = work.mutations_per_pixel;
-    return name == "pssmlt"
-               ? render_pssmlt(loaded.scene, with(PssmltOptions{}), render, amount).image
-               : render_mmlt(loaded.scene, with(MmltOptions{}), render, 2.0 * amount).image;
+    if (name == "pssmlt")
+      return render_pssmlt(loaded.scene, with(PssmltOptions{}), render, amount).image;
+    if (name == "h2mc") return render_h2mc(loaded.scene, with(H2mcOptions{}), render, amount).image;
+    if (name == "lmc") return render_lmc(loaded.scene, with(LmcOptions{}), render, amount).image;
+    return render_mmlt(loaded.scene, with(MmltOptions{}), render, 2.0 * amount).image;
   };
   test::expect_equal_tiles(name, tiles_over_runs(image), traced_tiles(scene), work.resolution);
 }
 
 INSTANTIATE_TEST_SUITE_P(Some, PrimaryEqualsPath,
                          testing::Values(Case{"cornell_glossy", "mmlt"},
-                                         Case{"limelight", "pssmlt"}),
+                                         Case{"limelight", "pssmlt"}, Case{"limelight", "h2mc"},
+                                         Case{"cornell_glossy", "lmc"}),
                          name_of);
 
 std::vector<Case> all_primary_cases() {
   std::vector<Case> cases;
   for (const auto& scene : works())
-    for (const char* name : {"pssmlt", "mmlt"}) cases.emplace_back(scene.first, name);
+    for (const char* name : {"pssmlt", "mmlt", "h2mc", "lmc"})
+      cases.emplace_back(scene.first, name);
   return cases;
 }
 

@@ -172,6 +172,10 @@ TEST(Primary, DoesNotDependOnThreads) {
   pssmlt.bootstrap = 1000;
   MmltOptions mmlt;
   mmlt.bootstrap = 1000;
+  H2mcOptions h2mc;
+  h2mc.bootstrap = 1000;
+  LmcOptions lmc;
+  lmc.bootstrap = 1000;
   std::vector<std::vector<float>> images;
   for (const int threads : {1, 2, 4}) {
     RenderOptions render;
@@ -179,8 +183,10 @@ TEST(Primary, DoesNotDependOnThreads) {
     render.seed = 3;
     images.push_back(render_pssmlt(scene, pssmlt, render, 4).image.rgb);
     images.push_back(render_mmlt(scene, mmlt, render, 4).image.rgb);
+    images.push_back(render_h2mc(scene, h2mc, render, 1).image.rgb);
+    images.push_back(render_lmc(scene, lmc, render, 1).image.rgb);
   }
-  for (std::size_t i = 2; i < images.size(); ++i) EXPECT_EQ(images[i], images[i % 2]);
+  for (std::size_t i = 4; i < images.size(); ++i) EXPECT_EQ(images[i], images[i % 4]);
 }
 
 TEST(Primary, OptionsAreChecked) {
@@ -191,6 +197,12 @@ TEST(Primary, OptionsAreChecked) {
   EXPECT_NO_THROW(options.validate());
   options.step_max = 1.5;
   EXPECT_THROW(options.validate(), OptionError);
+  H2mcOptions h2mc;
+  h2mc.sigma = 0;
+  EXPECT_THROW(h2mc.validate(), OptionError);
+  LmcOptions lmc;
+  lmc.adaptation_decay = 1.5;
+  EXPECT_THROW(lmc.validate(), OptionError);
 }
 
 }  // namespace

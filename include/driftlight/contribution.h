@@ -24,7 +24,8 @@
 ///       prod_light free   f_s |n_s.w_o|  |n_g.w_i| / |n_g.w_o|
 ///       prod_light delta  {R_k or 1 - R_k}  |n_s.w_o n_g.w_i| / |n_s.w_i n_g.w_o|  L_begin,
 ///   L_begin = L_e cos_y      area emitter        I falloff      point or spot
-///             E              directional emitter, per area across its light,
+///             E              directional emitter, per area across its light
+///             L_e            environment, likewise and per solid angle,
 /// w_i toward the sensor and w_o toward the light as everywhere. The eta^-2 of transmission is
 /// gone: it is that of n^2 d omega. W(v_0) of t = 1 is at the direction of the joining edge.
 ///
@@ -93,7 +94,7 @@ class ContributionVisitor : public WalkVisitor<T> {
     log_scale_ += log(abs(cos_o * dot(n_g, e.wi) / (dot(n_s, e.wi) * dot(n_g, e.wo))));
     if (e.scattering == Scattering::Reflection) return;
     const double eta = std::get<Dielectric>(e.bsdf).eta;
-    log_scale_ += 2.0 * std::log(value(cos_o) > 0.0 ? eta : 1.0 / eta);
+    log_scale_ = log_scale_ + 2.0 * std::log(value(cos_o) > 0.0 ? eta : 1.0 / eta);
   }
   void area_emission(const AreaEmitter& emitter, const Vec3<T>& normal, const Vec3<T>& v) {
     using std::log;
@@ -104,6 +105,9 @@ class ContributionVisitor : public WalkVisitor<T> {
   void point_emission(const Emitter& emitter, const Vec3<T>& v) { emit_from_point(emitter, v); }
   void directional_emission(const DirectionalEmitter& emitter, const Vec3<T>&) {
     directional_connection(emitter);
+  }
+  void environment_emission(const Emitter& emitter, const Vec3<T>&, const Vec3<T>& v) {
+    environment(emitter, Vec3<T>(-v));
   }
   void joined(const T& r2) {
     using std::log;

@@ -62,7 +62,15 @@ class SpotEmitter {
 
   /// Draws a direction in proportion to the falloff, whose density is falloff / solid_angle();
   /// u1, u2 in [0, 1).
-  Vec3d sample(double u1, double u2) const;
+  template <Scalar T>
+  Vec3<T> sample(const T& u1, const T& u2) const {
+    using std::cos;
+    using std::sin;
+    const T theta = angle_of_share(T(u1 * 0.5 * kInvPi * solid_angle_));
+    const T phi = 2.0 * kPi * u2;
+    const T sine = sin(theta);
+    return to_world<T>({sine * cos(phi), sine * sin(phi), cos(theta)}, constant<T>(axis_));
+  }
   /// The inverse of `sample`, for a direction in the cone.
   Vec2d inverse(const Vec3d& v) const;
   /// Integral of the falloff over the sphere: power / intensity, steradians.
@@ -75,6 +83,28 @@ class SpotEmitter {
   double angle(const Vec3d& v) const;
   /// Integral of the falloff from the axis to theta, over 2 pi.
   double integral(double theta) const;
+  /// Its inverse.
+  double angle_of_share(double share) const;
+  /// From its value, Newton steps: each doubles the order of the derivatives that are right.
+  template <Scalar T>
+  requires(ScalarTraits<T>::is_jet) T angle_of_share(const T& share)
+  const {
+    using std::asin;
+    using std::cos;
+    using std::sin;
+    using std::sqrt;
+    if (value(share) <= integral(beam_width_)) return 2.0 * asin(sqrt(0.5 * share));
+    const double start = integral(beam_width_) +
+                         ((cutoff_ - beam_width_) * std::cos(beam_width_) + std::sin(beam_width_)) *
+                             inverse_transition_;
+    T theta = constant<T>(angle_of_share(value(share)));
+    for (int i = 0; i < 2; ++i) {
+      const T rest = cutoff_ - theta;
+      const T excess = start - (rest * cos(theta) + sin(theta)) * inverse_transition_ - share;
+      theta = theta - excess / (rest * sin(theta) * inverse_transition_);
+    }
+    return theta;
+  }
 
   Vec3d position_;
   Vec3d axis_;
@@ -128,8 +158,20 @@ class EnvironmentMap {
   /// components normal to d have a meaning.
   Eigen::Matrix3d gradient(const Vec3d& d) const;
 
-  /// Draws a direction about in proportion to luminance; u1, u2 in [0, 1).
-  Vec3d sample(double u1, double u2) const;
+  /// Draws a direction about in proportion to luminance; u1, u2 in [0, 1). The patch is a discrete
+  /// choice.
+  template <Scalar T>
+  Vec3<T> sample(T u1, T u2) const {
+    using std::cos;
+    using std::sin;
+    const auto row = static_cast<std::size_t>(rows_.sample(u1));
+    const int column = columns_[row].sample(u2);
+    const T y = edges_[row] + u1 * (edges_[row + 1] - edges_[row]);
+    const T sine = root_or_zero(T(1.0 - y * y));
+    const T phi = 2.0 * kPi * (column + 0.5 + u2) / static_cast<double>(bitmap_.width);
+    return unit<T>(constant<T>(axis_x_) * T(sine * sin(phi)) + constant<T>(axis_y_) * y -
+                   constant<T>(axis_z_) * T(sine * cos(phi)));
+  }
   /// The inverse of `sample`.
   Vec2d inverse(const Vec3d& d) const;
   /// Density of `sample` per solid angle; positive wherever `eval` is.

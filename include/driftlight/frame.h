@@ -42,6 +42,14 @@ Vec3<T> normalized(const Vec3<T>& v) {
   return scaled(v, constant<T>(1.0) / sqrt(dot(v, v)));
 }
 
+/// v / |v|, rounded as Eigen does it.
+template <Scalar T>
+Vec3<T> unit(const Vec3<T>& v) {
+  using std::sqrt;
+  const T length = sqrt(dot(v, v));
+  return {v.x() / length, v.y() / length, v.z() / length};
+}
+
 /// Mirror direction of w about the unit normal n, both leaving the surface: 2 (n.w) n - w.
 template <Scalar T>
 Vec3<T> reflect(const Vec3<T>& w, const Vec3<T>& n) {
@@ -64,28 +72,39 @@ Vec3<T> refract(const Vec3<T>& w, const Vec3<T>& n, double eta) {
 }
 
 /// Columns t, b completing the unit vector n to a right-handed orthonormal basis (t, b, n).
-/// Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1), 2017.
-struct TangentBasis {
-  Vec3d t;
-  Vec3d b;
+/// Duff et al., "Building an orthonormal basis, revisited", JCGT 6(1), 2017. The sign of n.z
+/// chooses between two bases; within each the basis is smooth.
+template <Scalar T>
+struct TangentBasisOf {
+  Vec3<T> t;
+  Vec3<T> b;
 };
+using TangentBasis = TangentBasisOf<double>;
 
-inline TangentBasis tangent_basis(const Vec3d& n) {
-  const double sign = std::copysign(1.0, n.z());
-  const double a = -1.0 / (sign + n.z());
-  const double k = n.x() * n.y() * a;
+template <Scalar T>
+TangentBasisOf<T> tangent_basis(const Vec3<T>& n) {
+  const double sign = std::copysign(1.0, value(n.z()));
+  const T a = -1.0 / (sign + n.z());
+  const T k = n.x() * n.y() * a;
   return {{1.0 + sign * n.x() * n.x() * a, sign * k, -sign * n.x()},
           {k, sign + n.y() * n.y() * a, -n.y()}};
 }
 
 /// The direction with coordinates `local` in (t, b, n).
-inline Vec3d to_world(const Vec3d& local, const Vec3d& n) {
-  const TangentBasis basis = tangent_basis(n);
+template <Scalar T>
+Vec3<T> to_world(const Vec3<T>& local, const Vec3<T>& n) {
+  const TangentBasisOf<T> basis = tangent_basis(n);
   return basis.t * local.x() + basis.b * local.y() + n * local.z();
 }
-inline Vec3d to_local(const Vec3d& world, const Vec3d& n) {
-  const TangentBasis basis = tangent_basis(n);
-  return {basis.t.dot(world), basis.b.dot(world), n.dot(world)};
+template <Scalar T>
+Vec3<T> to_local(const Vec3<T>& world, const Vec3<T>& n) {
+  const TangentBasisOf<T> basis = tangent_basis(n);
+  return {dot(basis.t, world), dot(basis.b, world), dot(n, world)};
 }
+
+// Of what converts to vectors of numbers.
+inline TangentBasis tangent_basis(const Vec3d& n) { return tangent_basis<double>(n); }
+inline Vec3d to_world(const Vec3d& local, const Vec3d& n) { return to_world<double>(local, n); }
+inline Vec3d to_local(const Vec3d& world, const Vec3d& n) { return to_local<double>(world, n); }
 
 }  // namespace driftlight

@@ -177,6 +177,39 @@ struct PssmltOptions : PrimaryOptions {};
 /// Of one strategy at a time, which is a coordinate (Hachisuka et al. 2014).
 struct MmltOptions : PrimaryOptions {};
 
+/// As MmltOptions, with small steps that know derivatives of the target (gaussian_step.h).
+struct GaussianStepOptions : PrimaryOptions {
+  /// Share of the small steps that are those of Kelemen et al. all the same. They alone change the
+  /// strategy.
+  double isotropic_probability = 0.1;
+};
+/// Hessian-Hamiltonian dynamics (Li et al. 2015).
+struct H2mcOptions : GaussianStepOptions {
+  /// Standard deviation of the isotropic prior of a step.
+  double sigma = 0.02;
+
+  /// Throws OptionError.
+  void validate() const;
+};
+/// Langevin dynamics with a diagonal preconditioner that adapts to gradients (Luan et al. 2020).
+struct LmcOptions : GaussianStepOptions {
+  /// Time step: the variance of a step, over the preconditioner.
+  double step = 0.005;
+  /// Standard deviation of the isotropic prior of a step.
+  double sigma = 0.02;
+  /// Longer gradients are cut to this length.
+  double gradient_bound = 100;
+  /// Weight of former gradients in the drift at first; it falls off as t^-adaptation_decay.
+  double momentum = 0.9;
+  /// Weight of the current gradient in the preconditioner; former ones have the rest.
+  double locality = 0.5;
+  /// The t-th gradient gets the weight t^-adaptation_decay among former ones.
+  double adaptation_decay = 0.7;
+
+  /// Throws OptionError.
+  void validate() const;
+};
+
 /// As options name it.
 std::string_view name_of(PhaseSpace phase_space);
 
@@ -195,6 +228,8 @@ std::vector<OptionEntry> entries(PathOptions& options);
 std::vector<OptionEntry> entries(BdptOptions& options);
 std::vector<OptionEntry> entries(LightOptions& options);
 std::vector<OptionEntry> entries(PrimaryOptions& options);
+std::vector<OptionEntry> entries(H2mcOptions& options);
+std::vector<OptionEntry> entries(LmcOptions& options);
 
 /// Sets `name` to `value`. Throws OptionError naming the option and the valid ones or values.
 void set_option(const std::vector<OptionEntry>& entries, const std::string& name,

@@ -101,6 +101,7 @@ struct PathTopology {
 ///   PathEnd::PointEmission        the emitted direction,
 ///   PathEnd::DirectionalEmission  the point where the ray crosses the disk of the scene's radius
 ///                                 across the light that touches the scene's sphere,
+///   PathEnd::Environment          a point of the ray and its direction (of no chart: see walk.h),
 /// and the free directions at its vertices, in order from the emitter, but that of the joining
 /// edge.
 struct PathCoordinates {

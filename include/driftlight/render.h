@@ -162,6 +162,20 @@ LangevinResult render_pssmlt(const Scene& scene, const PssmltOptions& options,
 LangevinResult render_mmlt(const Scene& scene, const MmltOptions& options,
                            const RenderOptions& render, double mutations_per_pixel);
 
+/// Renders with Hessian-Hamiltonian Monte Carlo (Li, Lehtinen, Ramamoorthi, Jakob and Durand 2015,
+/// "Anisotropic Gaussian mutations for Metropolis light transport through Hessian-Hamiltonian
+/// dynamics"): chains as of MMLT, whose small steps follow the gradient and the Hessian of the
+/// target. Statistics as of Mode::Chain. Throws as render_langevin.
+LangevinResult render_h2mc(const Scene& scene, const H2mcOptions& options,
+                           const RenderOptions& render, double mutations_per_pixel);
+
+/// Renders with Langevin Monte Carlo (Luan, Zhao, Bala and Gkioulekas 2020, "Langevin Monte Carlo
+/// rendering with gradient-based adaptation"), online: chains as of MMLT, whose small steps follow
+/// the gradient, scaled in each coordinate by former ones. Statistics as of Mode::Chain. Throws as
+/// render_langevin.
+LangevinResult render_lmc(const Scene& scene, const LmcOptions& options,
+                          const RenderOptions& render, double mutations_per_pixel);
+
 /// Of an integrator whose samples are independent.
 struct PathResult {
   Image image;

@@ -45,10 +45,13 @@ struct Shape {
 };
 
 /// A point drawn on an emitter, for a connection.
-struct EmitterPoint {
-  Vec3d p = Vec3d::Zero();
-  Vec3d n = Vec3d::Zero();  ///< unit normal on the emitting side; zero for points and spots
+template <Scalar T>
+struct EmitterPointOf {
+  Vec3<T> p = constant<T>(Vec3d(Vec3d::Zero()));
+  /// Unit normal on the emitting side; zero for points and spots.
+  Vec3<T> n = constant<T>(Vec3d(Vec3d::Zero()));
 };
+using EmitterPoint = EmitterPointOf<double>;
 
 class Scene {
  public:

@@ -29,11 +29,13 @@ struct PerspectiveCamera {
   }
 
   /// Unit direction through the film point.
-  Vec3d direction(const Vec2d& film) const {
-    return (forward + (2.0 * film.x() - 1.0) * half_width * right +
-            (1.0 - 2.0 * film.y()) * half_height * up)
-        .normalized();
+  template <Scalar T>
+  Vec3<T> direction(const Vec2<T>& film) const {
+    return unit<T>(constant<T>(forward) +
+                   T((2.0 * film.x() - 1.0) * half_width) * constant<T>(right) +
+                   T((1.0 - 2.0 * film.y()) * half_height) * constant<T>(up));
   }
+  Vec3d direction(const Vec2d& film) const { return direction<double>(film); }
 
   /// Cosine between v and the optical axis.
   template <Scalar T>

@@ -62,6 +62,8 @@ struct WalkVisitor {
   void point_emission(const Emitter&, const Vec3<T>& /*v*/) {}
   /// `offset` from the centre of the disk across the light, in units of its radius.
   void directional_emission(const DirectionalEmitter&, const Vec3<T>& /*offset*/) {}
+  /// Light of an environment along v, `offset` as that of a directional emitter.
+  void environment_emission(const Emitter&, const Vec3<T>& /*offset*/, const Vec3<T>& /*v*/) {}
   /// Scattering on the light side; wi is toward the sensor, as everywhere.
   void light_scatter(const ScatterEvent<T>&) {}
   void light_delta(const ScatterEvent<T>&) {}
@@ -112,6 +114,24 @@ WalkVertex<T> arrive(const Scene& scene, const PathVertex& vertex, const Ray<T>&
   const Bsdf& bsdf =
       acting != nullptr ? *acting : scene.bsdfs()[scene.materials()[shape.material].front];
   return {vertex, shape, at, w, bsdf};
+}
+
+/// Block k at a vertex, which it may depend on.
+template <Scalar T, class Blocks>
+Vec3<T> free_direction(const Blocks& blocks, int k, const WalkVertex<T>& x) {
+  if constexpr (requires { blocks(k, x); })
+    return blocks(k, x);
+  else
+    return blocks(k);
+}
+
+/// Outward normal of the emitter at the block y, which coordinates may know better.
+template <Scalar T, class Blocks>
+Vec3<T> normal_at_end(const Blocks& blocks, const Shape& shape, const Vec3<T>& y) {
+  if constexpr (requires { blocks.emitter_normal(); })
+    return blocks.emitter_normal();
+  else
+    return emitter_normal(shape, y);
 }
 
 /// The walk along a path with a light side.
@@ -190,11 +210,18 @@ class TwoSidedWalk {
       visitor_.leave_point(y);
       return {y, constant<T>(parallel->direction)};
     }
+    if (topology_.end == PathEnd::Environment) {
+      const Vec3<T> v = blocks_(next_block_++);
+      visitor_.environment_emission(
+          emitter,
+          scaled(Vec3<T>(y - constant<T>(scene_.center())), constant<T>(1.0 / scene_.radius())), v);
+      return {y, v};
+    }
     const auto& light = std::get<AreaEmitter>(emitter);
     const Shape& shape = scene_.shapes()[light.shape];
     visitor_.position(shape, y);
     visitor_.leave_point(y);
-    const Vec3<T> normal = emitter_normal(shape, y);
+    const Vec3<T> normal = normal_at_end(blocks_, shape, y);
     Ray<T> ray{y, blocks_(next_block_++)};
     visitor_.area_emission(light, normal, ray.direction);
     visitor_.depart(ray, normal);
@@ -205,7 +232,7 @@ class TwoSidedWalk {
   void leave(const WalkVertex<T>& x, Ray<T>& ray) {
     ray.origin = x.at.p;
     ray.direction = x.vertex.delta ? delta_direction(x.bsdf, x.surface(), x.w, x.vertex.scattering)
-                                   : blocks_(next_block_++);
+                                   : free_direction(blocks_, next_block_++, x);
   }
 
   void join(const WalkVertex<T>& x, const WalkVertex<T>& y) {
@@ -245,7 +272,12 @@ class TwoSidedWalk {
 };
 
 /// Walks the path. `blocks(k)` gives block k as Vec3<T> (see PathCoordinates); each is asked for
-/// once, in order.
+/// once, in order. Where it exists, `blocks(k, x)` is asked for the free direction at the vertex x,
+/// and `blocks.emitter_normal()` for the normal at the emitter point.
+///
+/// A path with PathEnd::Environment and a light side has two blocks for the emitted ray, a point on
+/// it and its direction along the light. No chart has such paths, but the strategies of
+/// bidirectional path tracing do.
 template <Scalar T, class Blocks, class Visitor>
 void walk(const Scene& scene, const PathTopology& topology, const Blocks& blocks,
           Visitor& visitor) {
@@ -270,7 +302,7 @@ void walk(const Scene& scene, const PathTopology& topology, const Blocks& blocks
         ray.direction = delta_direction(x.bsdf, x.surface(), wi, x.vertex.scattering);
         visitor.delta(x.event(wi, ray.direction));
       } else {
-        ray.direction = blocks(next_block++);
+        ray.direction = free_direction(blocks, next_block++, x);
         visitor.scatter(x.event(wi, ray.direction));
       }
       visitor.depart(ray, at.n_g);
@@ -293,7 +325,7 @@ void walk(const Scene& scene, const PathTopology& topology, const Blocks& blocks
       const auto& light = std::get<AreaEmitter>(emitter);
       const Shape& light_shape = scene.shapes()[light.shape];
       visitor.position(light_shape, y);
-      visitor.area_connection(light, -dot(emitter_normal(light_shape, y), wo), r2);
+      visitor.area_connection(light, -dot(normal_at_end(blocks, light_shape, y), wo), r2);
     } else {
       visitor.point_connection(emitter, wo, r2);
     }

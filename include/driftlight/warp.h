@@ -9,14 +9,56 @@
 
 namespace driftlight {
 
+/// Root of what rounding may make negative; there it is 0, without derivatives.
+template <Scalar T>
+T root_or_zero(const T& x) {
+  using std::sqrt;
+  return value(x) > 0.0 ? T(sqrt(x)) : constant<T>(0.0);
+}
+
+/// (r cos phi, r sin phi), phi = 2 pi u.
+template <Scalar T>
+Vec2<T> polar(const T& r, const T& u) {
+  using std::cos;
+  using std::sin;
+  const T phi = 2.0 * kPi * u;
+  return {r * cos(phi), r * sin(phi)};
+}
+
 /// Uniform on the unit sphere, density 1 / (4 pi).
-Vec3d square_to_sphere(double u1, double u2);
+template <Scalar T>
+Vec3<T> square_to_sphere(const T& u1, const T& u2) {
+  const T z = 1.0 - 2.0 * u1;
+  const Vec2<T> xy = polar(root_or_zero(T(1.0 - z * z)), u2);
+  return {xy.x(), xy.y(), z};
+}
 /// About z, density cos / pi.
-Vec3d square_to_cosine_hemisphere(double u1, double u2);
+template <Scalar T>
+Vec3<T> square_to_cosine_hemisphere(const T& u1, const T& u2) {
+  using std::sqrt;
+  const Vec2<T> xy = polar(T(sqrt(u1)), u2);
+  return {xy.x(), xy.y(), sqrt(1.0 - u1)};
+}
 /// About z, density (n + 1) / (2 pi) cos^n.
-Vec3d square_to_cosine_power(double u1, double u2, double exponent);
+template <Scalar T>
+Vec3<T> square_to_cosine_power(const T& u1, const T& u2, double exponent) {
+  T z;
+  if constexpr (ScalarTraits<T>::is_jet) {
+    using std::exp;
+    using std::log;
+    z = exp(log(1.0 - u1) * (1.0 / (exponent + 1.0)));
+  } else {
+    z = std::pow(1.0 - u1, 1.0 / (exponent + 1.0));
+  }
+  const Vec2<T> xy = polar(root_or_zero(T(1.0 - z * z)), u2);
+  return {xy.x(), xy.y(), z};
+}
 /// Uniform on the unit disk (polar map), density 1 / pi.
-Vec2d square_to_disk(double u1, double u2);
+template <Scalar T>
+Vec2<T> square_to_disk(const T& u1, const T& u2) {
+  using std::sqrt;
+  return polar(T(sqrt(u1)), u2);
+}
 
 // Their inverses, with values in [0, 1].
 Vec2d sphere_to_square(const Vec3d& v);
@@ -36,14 +78,23 @@ class DiscreteDistribution {
   double probability(int i) const {
     return cumulative_[static_cast<std::size_t>(i) + 1] - cumulative_[static_cast<std::size_t>(i)];
   }
-  /// Draws an index of positive probability and turns u into a fresh number in [0, 1).
-  int sample(double& u) const;
+  /// Draws an index of positive probability and turns u into a fresh number in [0, 1). The index is
+  /// a discrete choice, by the value of u.
+  template <Scalar T>
+  int sample(T& u) const {
+    const int i = index_of(value(u));
+    u = (u - cumulative_[static_cast<std::size_t>(i)]) / probability(i);
+    if (value(u) > 1.0 - 1e-16) u = constant<T>(1.0 - 1e-16);
+    return i;
+  }
   /// The number that `sample` turns into the index i and a fresh number u.
   double inverse(int i, double u) const {
     return cumulative_[static_cast<std::size_t>(i)] + u * probability(i);
   }
 
  private:
+  int index_of(double u) const;
+
   std::vector<double> cumulative_{0.0};
   double total_ = 0;
 };

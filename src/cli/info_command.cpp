@@ -140,30 +140,39 @@ void run(const InfoCommand& command) {
 }
 
 void run(const IntegratorsCommand& /*command*/) {
-  print(describe_integrator<LangevinOptions>(
-            "langevin",
-            "Metropolis-adjusted Langevin sampling of light paths (Ershov, Frolov, Nikolaev and "
-            "Voloboy 2023, doi 10.20948/prepr-2023-63)") +
-        describe_integrator<PssmltOptions>(
-            "pssmlt",
-            "primary sample space Metropolis light transport with bidirectional path tracing "
-            "(Kelemen, Szirmay-Kalos, Antal and Csonka 2002, doi 10.1111/1467-8659.t01-1-00703)") +
-        describe_integrator<MmltOptions>(
-            "mmlt",
-            "multiplexed Metropolis light transport (Hachisuka, Kaplanyan and Dachsbacher 2014, "
-            "doi 10.1145/2601097.2601138)") +
-        describe_integrator<PathOptions>(
-            "path",
-            "path tracing with next-event estimation (Kajiya 1986, doi 10.1145/15922.15902; "
-            "Veach 1997)") +
-        describe_integrator<BdptOptions>(
-            "bdpt",
-            "bidirectional path tracing with all connections (Lafortune and Willems 1993; "
-            "Veach 1997)") +
-        describe_integrator<LightOptions>(
-            "light",
-            "light tracing; what is seen by way of smooth mirrors and glass is missing (Dutre, "
-            "Lafortune and Willems 1993; Veach 1997)"));
+  print(
+      describe_integrator<LangevinOptions>(
+          "langevin",
+          "Metropolis-adjusted Langevin sampling of light paths (Ershov, Frolov, Nikolaev and "
+          "Voloboy 2023, doi 10.20948/prepr-2023-63)") +
+      describe_integrator<PssmltOptions>(
+          "pssmlt",
+          "primary sample space Metropolis light transport with bidirectional path tracing "
+          "(Kelemen, Szirmay-Kalos, Antal and Csonka 2002, doi 10.1111/1467-8659.t01-1-00703)") +
+      describe_integrator<MmltOptions>(
+          "mmlt",
+          "multiplexed Metropolis light transport (Hachisuka, Kaplanyan and Dachsbacher 2014, "
+          "doi 10.1145/2601097.2601138)") +
+      describe_integrator<H2mcOptions>(
+          "h2mc",
+          "mmlt with Gaussian steps from the Hessian by Hamiltonian dynamics (Li, Lehtinen, "
+          "Ramamoorthi, Jakob and Durand 2015, doi 10.1145/2816795.2818084)") +
+      describe_integrator<LmcOptions>(
+          "lmc",
+          "mmlt with Langevin steps and a diagonal preconditioner that adapts to gradients (Luan, "
+          "Zhao, Bala and Gkioulekas 2020, doi 10.1145/3386569.3392382)") +
+      describe_integrator<PathOptions>(
+          "path",
+          "path tracing with next-event estimation (Kajiya 1986, doi 10.1145/15922.15902; "
+          "Veach 1997)") +
+      describe_integrator<BdptOptions>(
+          "bdpt",
+          "bidirectional path tracing with all connections (Lafortune and Willems 1993; "
+          "Veach 1997)") +
+      describe_integrator<LightOptions>(
+          "light",
+          "light tracing; what is seen by way of smooth mirrors and glass is missing (Dutre, "
+          "Lafortune and Willems 1993; Veach 1997)"));
 }
 
 }  // namespace driftlight::cli

@@ -36,6 +36,16 @@ LangevinResult result_of(const Scene& scene, const MmltOptions& options, const R
   return render_mmlt(scene, options, how, mutations(work));
 }
 
+LangevinResult result_of(const Scene& scene, const H2mcOptions& options, const RenderOptions& how,
+                         const Work& work) {
+  return render_h2mc(scene, options, how, mutations(work));
+}
+
+LangevinResult result_of(const Scene& scene, const LmcOptions& options, const RenderOptions& how,
+                         const Work& work) {
+  return render_lmc(scene, options, how, mutations(work));
+}
+
 PathResult result_of(const Scene& scene, const PathOptions& options, const RenderOptions& how,
                      const Work& work) {
   return render_path(scene, options, how, samples(work));
@@ -55,6 +65,8 @@ std::string_view name_of(const PssmltOptions& /*options*/) {
   return cli::name_of(Integrator::Pssmlt);
 }
 std::string_view name_of(const MmltOptions& /*options*/) { return cli::name_of(Integrator::Mmlt); }
+std::string_view name_of(const H2mcOptions& /*options*/) { return cli::name_of(Integrator::H2mc); }
+std::string_view name_of(const LmcOptions& /*options*/) { return cli::name_of(Integrator::Lmc); }
 std::string_view name_of(const PathOptions& /*options*/) { return cli::name_of(Integrator::Path); }
 std::string_view name_of(const BdptOptions& /*options*/) { return cli::name_of(Integrator::Bdpt); }
 std::string_view name_of(const LightOptions& /*options*/) {
@@ -79,6 +91,10 @@ IntegratorOptions options_of(Integrator integrator) {
       return PssmltOptions{};
     case Integrator::Mmlt:
       return MmltOptions{};
+    case Integrator::H2mc:
+      return H2mcOptions{};
+    case Integrator::Lmc:
+      return LmcOptions{};
     case Integrator::Path:
       return PathOptions{};
     case Integrator::Bdpt:
@@ -115,8 +131,9 @@ std::string take_depth(const LoadedScene& loaded, const Settings& settings,
 bool counts_mutations(const IntegratorOptions& options) {
   if (const auto* langevin = std::get_if<LangevinOptions>(&options))
     return langevin->mode == Mode::Chain;
-  return std::holds_alternative<PssmltOptions>(options) ||
-         std::holds_alternative<MmltOptions>(options);
+  return std::visit(
+      [](const auto& of) { return std::is_base_of_v<PrimaryOptions, std::decay_t<decltype(of)>>; },
+      options);
 }
 
 Rendered render_with(const Scene& scene, IntegratorOptions& options, const RenderOptions& how,

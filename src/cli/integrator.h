@@ -18,8 +18,8 @@
 namespace driftlight::cli {
 
 /// In the order of `Integrator`.
-using IntegratorOptions = std::variant<LangevinOptions, PssmltOptions, MmltOptions, PathOptions,
-                                       BdptOptions, LightOptions>;
+using IntegratorOptions = std::variant<LangevinOptions, PssmltOptions, MmltOptions, H2mcOptions,
+                                       LmcOptions, PathOptions, BdptOptions, LightOptions>;
 
 /// The defaults.
 IntegratorOptions options_of(Integrator integrator);

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+/// How BSDFs turn numbers into directions, and with which density, for every Scalar.
+///
+/// Which lobe takes a sample is a discrete choice: it is made by values, and derivatives are those
+/// of the lobe taken.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "driftlight/bsdf.h"
+#include "driftlight/warp.h"
+
+namespace driftlight {
+
+template <Scalar T>
+struct WarpedDirection {
+  Vec3<T> wo;
+  Scattering scattering;
+};
+
+namespace detail {
+
+template <Scalar T>
+using Warped = std::optional<WarpedDirection<T>>;
+
+/// A sample that leaves on the wrong side is lost; its mass is missing from the pdf's integral.
+template <Scalar T>
+Warped<T> reflected(const Vec3<T>& wo, const Vec3<T>& wi, const Vec3<T>& n) {
+  if (value(n).dot(value(wo)) * value(n).dot(value(wi)) <= 0.0) return std::nullopt;
+  return WarpedDirection<T>{wo, Scattering::Reflection};
+}
+
+template <Scalar T>
+Vec3<T> warp_diffuse(const Vec3<T>& n, const Vec3<T>& u) {
+  return to_world<T>(square_to_cosine_hemisphere(u.x(), u.y()), n);
+}
+
+template <Scalar T>
+Warped<T> warp_bsdf(const Diffuse&, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                    const Vec3<T>& u) {
+  if (value(at.n).dot(value(wi)) <= 0.0) return std::nullopt;
+  return reflected<T>(warp_diffuse(at.n, u), wi, at.n);
+}
+
+template <Scalar T>
+T pdf_bsdf(const Diffuse&, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& wo) {
+  if (value(at.n).dot(value(wi)) <= 0.0) return constant<T>(0.0);
+  const T cos_o = dot(at.n, wo);
+  return value(cos_o) > 0.0 ? T(cos_o * kInvPi) : constant<T>(0.0);
+}
+
+template <Scalar T>
+Warped<T> warp_bsdf(const Conductor&, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                    const Vec3<T>&) {
+  if (value(at.n).dot(value(wi)) <= 0.0) return std::nullopt;
+  return WarpedDirection<T>{reflect(wi, at.n), Scattering::Reflection};
+}
+
+template <Scalar T>
+T pdf_bsdf(const Conductor&, const SurfacePoint<T>&, const Vec3<T>&, const Vec3<T>&) {
+  return constant<T>(0.0);
+}
+
+template <Scalar T>
+Warped<T> warp_bsdf(const RoughConductor& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                    const Vec3<T>& u) {
+  if (value(at.n).dot(value(wi)) <= 0.0) return std::nullopt;
+  const Vec3<T> h = to_world<T>(b.microfacets.sample<T>(to_local<T>(wi, at.n), u.x(), u.y()), at.n);
+  return reflected<T>(reflect(wi, h), wi, at.n);
+}
+
+/// p(wo) = p(h) / (4 wi.h)
+template <Scalar T>
+T pdf_bsdf(const RoughConductor& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+           const Vec3<T>& wo) {
+  const T cos_i = dot(at.n, wi);
+  if (value(cos_i) <= 0.0 || value(at.n).dot(value(wo)) <= 0.0) return constant<T>(0.0);
+  const Vec3<T> h = unit<T>(wi + wo);
+  const T ih = dot(wi, h);
+  return b.microfacets.pdf<T>(cos_i, dot(at.n, h), ih) / (4.0 * ih);
+}
+
+template <Scalar T>
+T reflection_probability(const Dielectric& b, const T& cos_i) {
+  using std::abs;
+  return fresnel_dielectric(T(abs(cos_i)), value(cos_i) > 0.0 ? b.eta : 1.0 / b.eta);
+}
+
+template <Scalar T>
+Warped<T> warp_bsdf(const Dielectric& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                    const Vec3<T>& u) {
+  const double cos_i = value(at.n).dot(value(wi));
+  if (value(u.z()) < reflection_probability(b, cos_i))
+    return WarpedDirection<T>{reflect(wi, at.n), Scattering::Reflection};
+  return WarpedDirection<T>{refract(wi, at.n, cos_i > 0.0 ? b.eta : 1.0 / b.eta),
+                            Scattering::Transmission};
+}
+
+template <Scalar T>
+T pdf_bsdf(const Dielectric&, const SurfacePoint<T>&, const Vec3<T>&, const Vec3<T>&) {
+  return constant<T>(0.0);
+}
+
+/// The facet normal is drawn on the side of wi, then reflection with probability F.
+template <Scalar T>
+Warped<T> warp_bsdf(const RoughDielectric& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                    const Vec3<T>& u) {
+  const double cos_i = value(at.n).dot(value(wi));
+  if (cos_i == 0.0) return std::nullopt;
+  const Vec3<T> n = cos_i > 0.0 ? at.n : Vec3<T>(-at.n);
+  const double eta = cos_i > 0.0 ? b.eta : 1.0 / b.eta;
+  const Vec3<T> h = to_world<T>(b.microfacets.sample<T>(to_local<T>(wi, n), u.x(), u.y()), n);
+  const double ih = value(wi).dot(value(h));
+  if (ih <= 0.0) return std::nullopt;
+  if (value(u.z()) < fresnel_dielectric(ih, eta)) return reflected<T>(reflect(wi, h), wi, n);
+  const Vec3<T> wo = refract(wi, h, eta);
+  if (value(n).dot(value(wo)) >= 0.0) return std::nullopt;
+  return WarpedDirection<T>{wo, Scattering::Transmission};
+}
+
+/// reflection p(h) F / (4 wi.h); transmission p(h) (1 - F) e^2 |wo.h| / (wi.h + e wo.h)^2
+template <Scalar T>
+T pdf_bsdf(const RoughDielectric& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+           const Vec3<T>& wo) {
+  using std::abs;
+  const double side = value(at.n).dot(value(wi)) > 0.0 ? 1.0 : -1.0;
+  const T cos_i = side * dot(at.n, wi);
+  const double cos_o = side * value(at.n).dot(value(wo));
+  if (value(cos_i) == 0.0 || cos_o == 0.0) return constant<T>(0.0);
+  const double eta = side > 0.0 ? b.eta : 1.0 / b.eta;
+  const double e = cos_o > 0.0 ? 1.0 : eta;
+  Vec3<T> h = unit<T>(wi + constant<T>(e) * wo);
+  if (value(at.n).dot(value(h)) * side < 0.0) h = -h;
+  const T ih = dot(wi, h);
+  const T oh = dot(wo, h);
+  if (value(ih) <= 0.0 || value(oh) * cos_o <= 0.0) return constant<T>(0.0);
+  const T p = b.microfacets.pdf<T>(cos_i, side * dot(at.n, h), ih);
+  const T fresnel = fresnel_dielectric(ih, eta);
+  if (cos_o > 0.0) return p * fresnel / (4.0 * ih);
+  const T denominator = ih + e * oh;
+  return p * (1.0 - fresnel) * e * e * abs(oh) / (denominator * denominator);
+}
+
+template <Scalar T>
+T specular_probability(const Phong& b, const Vec2<T>& uv) {
+  const T specular = luminance(b.specular_reflectance.eval(uv));
+  const T diffuse = luminance(b.diffuse_reflectance.eval(uv));
+  const T sum = specular + diffuse;
+  return value(sum) > 0.0 ? T(specular / sum) : constant<T>(0.0);
+}
+
+template <Scalar T>
+Warped<T> warp_bsdf(const Phong& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                    const Vec3<T>& u) {
+  if (value(at.n).dot(value(wi)) <= 0.0) return std::nullopt;
+  const Vec2d uv{value(at.uv.x()), value(at.uv.y())};
+  if (value(u.z()) < specular_probability(b, uv)) {
+    const Vec3<T> local = square_to_cosine_power(u.x(), u.y(), b.exponent);
+    return reflected<T>(to_world<T>(local, reflect(wi, at.n)), wi, at.n);
+  }
+  return reflected<T>(warp_diffuse(at.n, u), wi, at.n);
+}
+
+/// (n + 1) / (2 pi) max(0, wo . mirror)^n
+template <Scalar T>
+T phong_pdf(const Phong& b, const T& cos_mirror) {
+  const double norm = (b.exponent + 1.0) * (0.5 * kInvPi);
+  if constexpr (ScalarTraits<T>::is_jet) {
+    using std::exp;
+    using std::log;
+    if (value(cos_mirror) <= 0.0) return constant<T>(0.0);
+    return norm * exp(b.exponent * log(cos_mirror));
+  } else {
+    return norm * std::pow(std::max(0.0, cos_mirror), b.exponent);
+  }
+}
+
+template <Scalar T>
+T pdf_bsdf(const Phong& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& wo) {
+  const T cos_o = dot(at.n, wo);
+  if (value(at.n).dot(value(wi)) <= 0.0 || value(cos_o) <= 0.0) return constant<T>(0.0);
+  const T s = specular_probability(b, at.uv);
+  const T lobe = phong_pdf(b, T(dot(wo, reflect(wi, at.n))));
+  return s * lobe + (1.0 - s) * cos_o * kInvPi;
+}
+
+}  // namespace detail
+
+/// `sample`: wo from three numbers in [0, 1), of which the last chooses the lobe.
+template <Scalar T>
+std::optional<WarpedDirection<T>> warp(const Bsdf& bsdf, const SurfacePoint<T>& at,
+                                       const Vec3<T>& wi, const Vec3<T>& u) {
+  return std::visit([&](const auto& b) { return detail::warp_bsdf<T>(b, at, wi, u); }, bsdf);
+}
+
+/// `pdf`, with derivatives.
+template <Scalar T>
+T pdf_of(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& wo) {
+  return std::visit([&](const auto& b) { return detail::pdf_bsdf<T>(b, at, wi, wo); }, bsdf);
+}
+
+/// `delta_probability`, with derivatives.
+template <Scalar T>
+T delta_probability_of(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                       Scattering scattering) {
+  const auto* glass = std::get_if<Dielectric>(&bsdf);
+  if (glass == nullptr) return constant<T>(scattering == Scattering::Reflection ? 1.0 : 0.0);
+  const T reflection = detail::reflection_probability<T>(*glass, dot(at.n, wi));
+  return scattering == Scattering::Reflection ? reflection : T(1.0 - reflection);
+}
+
+}  // namespace driftlight

@@ -1,0 +1,316 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "primary_path.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "density_visitor.h"
+#include "driftlight/contribution.h"
+#include "emission_warp.h"
+#include "primary_sample.h"
+#include "visitor_pair.h"
+
+namespace driftlight {
+namespace {
+
+/// The blocks of a path (walk.h), from numbers. u(i) is the number i that steers it, as T.
+template <Scalar T, class Steering>
+class PrimaryBlocks {
+ public:
+  PrimaryBlocks(const Scene& scene, const StrategyNumbers& numbers, const PrimaryPath& path,
+                const Steering& u)
+      : scene_(scene), numbers_(numbers), path_(path), u_(u) {
+    if (path.strategy.s == 1)
+      set_connection();
+    else if (path.strategy.s > 1)
+      set_emission();
+  }
+
+  /// The first direction, and what leaves the emitter.
+  Vec3<T> operator()(int k) const {
+    const int t = path_.strategy.t;
+    if (k == 0 && t > 1) return scene_.camera().direction(Vec2<T>(u_(0), u_(1)));
+    const int first = path_.strategy.s > 1 ? path_.topology.camera_block_count() : k;
+    return k == first && has_point_ ? ray_.from.p : ray_.direction;
+  }
+  Vec3<T> operator()(int, const WalkVertex<T>& x) const {
+    const auto k = static_cast<int>(&x.vertex - path_.topology.vertices.data());
+    const auto [s, t] = path_.strategy;
+    if (s == 1 && k + 1 == path_.topology.scatter_count) return ray_.direction;
+    if (k < t - 1) return scattered(x, 2 + 2 * k, numbers_.sensor_lobe(k));
+    const int from_light = path_.topology.scatter_count - 1 - k;
+    return scattered(x, light_offset() + 4 + 2 * from_light, numbers_.light_lobe(from_light));
+  }
+  const Vec3<T>& emitter_normal() const { return ray_.from.n; }
+
+ private:
+  /// Numbers of the subpath from the sensor.
+  int light_offset() const { return 2 * std::max(path_.strategy.t - 1, 0); }
+
+  Vec3<T> scattered(const WalkVertex<T>& x, int i, double lobe) const {
+    const auto next =
+        warp<T>(x.bsdf, x.surface(), x.w, Vec3<T>(u_(i), u_(i + 1), constant<T>(lobe)));
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    return next ? next->wo : constant<T>(Vec3d(nan, nan, nan));
+  }
+
+  void set_connection() {
+    const T u1 = u_(light_offset());
+    const T u2 = u_(light_offset() + 1);
+    const Emitter& emitter = scene_.emitters()[path_.topology.emitter];
+    if (const auto* area = std::get_if<AreaEmitter>(&emitter)) {
+      ray_.from = warp_area(scene_.shapes()[area->shape], u1, u2);
+      has_point_ = true;
+    } else if (is_environment(emitter)) {
+      ray_.direction = warp_environment(emitter, u1, u2);
+    }
+  }
+  void set_emission() {
+    const int i = light_offset();
+    const std::array<T, 4> u{u_(i), u_(i + 1), u_(i + 2), u_(i + 3)};
+    const Emitter& emitter = scene_.emitters()[path_.topology.emitter];
+    has_point_ = !is_point(emitter);
+    if (const auto* area = std::get_if<AreaEmitter>(&emitter))
+      ray_ = warp_emission_from_area(scene_.shapes()[area->shape], u);
+    else if (is_point(emitter))
+      ray_ = warp_emission_from_point(emitter, u);
+    else if (const auto* parallel = std::get_if<DirectionalEmitter>(&emitter))
+      ray_ = warp_emission_from_infinity(scene_, constant<T>(Vec3d(-parallel->direction)), u);
+    else
+      ray_ = warp_emission_from_infinity(scene_, warp_environment(emitter, u[0], u[1]), u);
+  }
+
+  const Scene& scene_;
+  const StrategyNumbers& numbers_;
+  const PrimaryPath& path_;
+  const Steering& u_;
+  EmittedRay<T> ray_;  ///< what there is of it
+  bool has_point_ = false;
+};
+
+template <Scalar T>
+struct PrimaryVisitor : VisitorPair<T, ContributionVisitor<T>, DensityVisitor<T>> {
+  using VisitorPair<T, ContributionVisitor<T>, DensityVisitor<T>>::VisitorPair;
+  void vertex(int k) { this->second.vertex(k); }
+};
+
+/// log f - log sum_s p_s. Emitters that are seen directly are left to the strategy that hits them
+/// (strategy_weights.h).
+template <Scalar T, class Steering>
+T log_target_of(const Scene& scene, const EmissionGuide& guide, const StrategyNumbers& numbers,
+                const PrimaryPath& path, const Steering& u) {
+  using std::log;
+  const PrimaryBlocks<T, Steering> blocks(scene, numbers, path, u);
+  PrimaryVisitor<T> visitor(std::in_place, scene, guide, path.topology);
+  walk<T>(scene, path.topology, blocks, visitor);
+  const auto densities = densities_by_light_vertices(
+      visitor.second, path.topology, scene.emitter_probability(path.topology.emitter));
+  T sum = densities[0];
+  const int edges = path.strategy.edges();
+  for (int s = 1; edges > 1 && s <= edges; ++s) sum += densities[static_cast<std::size_t>(s)];
+  return visitor.first.log_target() - log(sum);
+}
+
+/// Which numbers matter: those of delta vertices and of positions that are fixed do not.
+struct ActiveNumbers {
+  std::array<int, kMaxDimension> indices{};
+  int count = 0;
+
+  void add_pair(int i) {
+    indices[static_cast<std::size_t>(count++)] = i;
+    indices[static_cast<std::size_t>(count++)] = i + 1;
+  }
+};
+
+ActiveNumbers active_numbers(const Scene& scene, const PrimaryPath& path) {
+  const auto [s, t] = path.strategy;
+  const PathTopology& topology = path.topology;
+  const Emitter& emitter = scene.emitters()[topology.emitter];
+  ActiveNumbers active;
+  const auto add_vertex = [&](int k, int i) {
+    if (!topology.vertices[static_cast<std::size_t>(k)].delta) active.add_pair(i);
+  };
+  if (t > 1) active.add_pair(0);
+  for (int k = 0; k < t - 2; ++k) add_vertex(k, 2 + 2 * k);
+  const int offset = 2 * std::max(t - 1, 0);
+  const bool fixed = is_point(emitter) || std::holds_alternative<DirectionalEmitter>(emitter);
+  if (s > 0 && !fixed) active.add_pair(offset);
+  if (s > 1) active.add_pair(offset + 2);
+  for (int j = 0; j < s - 2; ++j) add_vertex(topology.scatter_count - 1 - j, offset + 4 + 2 * j);
+  return active;
+}
+
+/// Place of number i among the active ones [first, first + N), which are differentiated by; else
+/// -1.
+template <int N>
+int column_of(const ActiveNumbers& active, int first, int i) {
+  for (int c = 0; c < N && first + c < active.count; ++c)
+    if (active.indices[static_cast<std::size_t>(first + c)] == i) return c;
+  return -1;
+}
+
+PathEnd end_of(const Emitter& emitter, int s) {
+  if (is_environment(emitter)) return PathEnd::Environment;
+  if (std::holds_alternative<AreaEmitter>(emitter)) {
+    if (s == 0) return PathEnd::Hit;
+    return s == 1 ? PathEnd::AreaConnection : PathEnd::AreaEmission;
+  }
+  if (is_point(emitter)) return s == 1 ? PathEnd::PointConnection : PathEnd::PointEmission;
+  return s == 1 ? PathEnd::DirectionalConnection : PathEnd::DirectionalEmission;
+}
+
+/// Blocks of the chart that the walk runs in.
+int count_blocks(const PathTopology& topology, int s) {
+  int count = topology.camera_block_count();
+  if (!topology.has_light_side()) {
+    count = 1;
+    for (int k = 0; k < topology.scatter_count; ++k)
+      if (!topology.vertices[static_cast<std::size_t>(k)].delta) ++count;
+    return topology.ends_at_delta_emitter() ? count - 1 : count;
+  }
+  count += topology.end == PathEnd::PointEmission || topology.end == PathEnd::DirectionalEmission
+               ? 1
+               : 2;
+  for (int j = 0; j < s - 2; ++j)
+    if (!topology.vertices[static_cast<std::size_t>(topology.scatter_count - 1 - j)].delta) ++count;
+  return count;
+}
+
+}  // namespace
+
+// ---- StrategyNumbers ------------------------------------------------------------------------
+
+StrategyNumbers::StrategyNumbers(int edges, Rng& rng) : edges_(edges) {
+  for (int i = 0; i < count(); ++i) numbers_[static_cast<std::size_t>(i)] = rng.uniform();
+}
+
+Strategy StrategyNumbers::strategy() const {
+  const int count = edges_ + 1;
+  const int s = std::min(static_cast<int>(count * numbers_[0]), edges_);
+  return {s, count - s};
+}
+
+std::size_t StrategyNumbers::index(const Strategy& strategy, int i) const {
+  const int from_sensor = 2 * std::max(strategy.t - 1, 0);
+  const auto place = [&] {
+    if (i < 2 && i < from_sensor) return kSensor + i;
+    if (i < from_sensor) return kSensor + 2 + 3 * ((i - 2) / 2) + i % 2;
+    const int j = i - from_sensor;
+    if (strategy.s == 1) return connection_begin() + 1 + j;
+    if (j < 4) return light_begin() + 1 + j;
+    return light_begin() + 5 + 3 * ((j - 4) / 2) + j % 2;
+  };
+  return static_cast<std::size_t>(place());
+}
+
+void StrategyNumbers::move(const PrimaryOptions& options, Rng& rng) {
+  for (int i = 0; i < count(); ++i) {
+    double& u = numbers_[static_cast<std::size_t>(i)];
+    u = moved(u, options, rng);
+  }
+}
+
+void StrategyNumbers::move_choices(const Strategy& strategy, const PrimaryOptions& options,
+                                   Rng& rng) {
+  const StrategyNumbers before = *this;
+  move(options, rng);
+  numbers_[0] = before.numbers_[0];
+  for (int i = 0; i < dimension(edges_); ++i) steering(strategy, i) = before.steering(strategy, i);
+}
+
+// ---- PrimaryPath ----------------------------------------------------------------------------
+
+PrimaryPath primary_path(const Scene& scene, const FoundPath& found) {
+  PrimaryPath path{{found.s, found.t}, {}};
+  PathTopology& topology = path.topology;
+  topology.emitter = found.end.emitter;
+  const auto add = [&](const SubpathVertex& x, const Vec3d& onward) {
+    PathVertex& vertex = topology.vertices[topology.scatter_count++];
+    vertex.hit = x.surface.hit;
+    vertex.delta = x.delta;
+    vertex.scattering = x.surface.side(onward);
+  };
+  topology.end = end_of(scene.emitters()[topology.emitter], found.s);
+  const int from_sensor = found.s == 0 ? found.t - 2 : found.t - 1;
+  // Where the last vertex scatters to does not matter: it is no delta vertex, or is left for the
+  // environment.
+  for (int i = 0; i < from_sensor; ++i) {
+    const SubpathVertex& x = found.from_sensor[i];
+    const bool last = i + 1 == found.from_sensor.size();
+    add(x, last ? found.end.p : Vec3d(-found.from_sensor[i + 1].surface.wi));
+  }
+  if (topology.end == PathEnd::Hit)
+    topology.vertices[topology.scatter_count].hit = found.from_sensor[from_sensor].surface.hit;
+  for (int i = found.s - 2; i >= 0; --i) {
+    const SubpathVertex& x = found.from_light[i];
+    add(x, i == found.s - 2 ? x.surface.wi : Vec3d(-found.from_light[i + 1].surface.wi));
+    ++topology.light_count;
+  }
+  topology.block_count = static_cast<std::uint8_t>(count_blocks(topology, found.s));
+  return path;
+}
+
+// ---- PrimaryFunction ------------------------------------------------------------------------
+
+double PrimaryFunction::log_target(const StrategyNumbers& numbers, const PrimaryPath& path) const {
+  const auto u = [&](int i) { return numbers.steering(path.strategy, i); };
+  return log_target_of<double>(scene_, guide_, numbers, path, u);
+}
+
+bool PrimaryFunction::gradient(const StrategyNumbers& numbers, const PrimaryPath& path,
+                               PrimaryDerivatives& result) const {
+  constexpr int kPass = 8;
+  using T = ceres::Jet<double, kPass>;
+  const ActiveNumbers active = active_numbers(scene_, path);
+  result.gradient.setZero(StrategyNumbers::dimension(path.strategy.edges()));
+  for (int first = 0; first < active.count; first += kPass) {
+    const auto u = [&](int i) {
+      T x(numbers.steering(path.strategy, i));
+      const int column = column_of<kPass>(active, first, i);
+      if (column >= 0) x.v[column] = 1.0;
+      return x;
+    };
+    const T y = log_target_of<T>(scene_, guide_, numbers, path, u);
+    for (int c = 0; c < kPass && first + c < active.count; ++c)
+      result.gradient[active.indices[static_cast<std::size_t>(first + c)]] = y.v[c];
+  }
+  return result.gradient.allFinite();
+}
+
+bool PrimaryFunction::gradient_and_hessian(const StrategyNumbers& numbers, const PrimaryPath& path,
+                                           PrimaryDerivatives& result) const {
+  constexpr int kWidth = 4;
+  using Inner = ceres::Jet<double, kWidth>;
+  using T = ceres::Jet<Inner, kWidth>;
+  const ActiveNumbers active = active_numbers(scene_, path);
+  const int d = StrategyNumbers::dimension(path.strategy.edges());
+  result.gradient.setZero(d);
+  result.hessian.setZero(d, d);
+  for (int outer = 0; outer < active.count; outer += kWidth) {
+    for (int inner = outer; inner < active.count; inner += kWidth) {
+      const auto u = [&](int i) {
+        T x(Inner(numbers.steering(path.strategy, i)));
+        const int row = column_of<kWidth>(active, outer, i);
+        const int column = column_of<kWidth>(active, inner, i);
+        if (row >= 0) x.v[row] = Inner(1.0);
+        if (column >= 0) x.a.v[column] = 1.0;
+        return x;
+      };
+      const T y = log_target_of<T>(scene_, guide_, numbers, path, u);
+      for (int r = 0; r < kWidth && outer + r < active.count; ++r) {
+        const int i = active.indices[static_cast<std::size_t>(outer + r)];
+        result.gradient[i] = y.v[r].a;
+        for (int c = 0; c < kWidth && inner + c < active.count; ++c) {
+          const int j = active.indices[static_cast<std::size_t>(inner + c)];
+          result.hessian(i, j) = y.v[r].v[c];
+          result.hessian(j, i) = y.v[r].v[c];
+        }
+      }
+    }
+  }
+  return result.gradient.allFinite() && result.hessian.allFinite();
+}
+
+}  // namespace driftlight

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+/// A path as a function of the numbers that it is drawn from, with derivatives.
+///
+/// Of one strategy (s, t) of bidirectional path tracing the numbers that steer a path are, two for
+/// each,
+///   the film point, and the directions at x_1 .. x_(t-2)               (t > 1),
+///   the emitted ray, four, and the directions at x_(n-1) .. x_(t+1)    (s > 1),
+///   the point on the emitter                                           (s = 1),
+/// 2 n in all for any strategy at paths of n edges. Those of a delta vertex, or of a point
+/// emitter's position, steer nothing. The others choose: the emitter, the lobe at each vertex, the
+/// strategy.
+///
+/// With the balance heuristic the target is
+///   I(u) = (n + 1) w_s f / p_s = (n + 1) f(X) / sum_s' p_s'(X),   X = X(u),
+/// in which f and p are those of contribution.h and path_density.h, and the measure cancels: for
+/// given choices a smooth function of the numbers.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "bidirectional_tracer.h"
+#include "driftlight/phase_space.h"
+#include "driftlight/random.h"
+
+namespace driftlight {
+
+/// The strategy (s, t), of paths of s + t - 1 edges.
+struct Strategy {
+  int s = 0;
+  int t = 0;
+
+  int edges() const { return s + t - 1; }
+  bool operator==(const Strategy&) const = default;
+};
+
+/// All numbers that strategies of paths of so many edges may ask for.
+class StrategyNumbers {
+ public:
+  /// Numbers that steer a path.
+  static int dimension(int edges) { return 2 * edges; }
+
+  StrategyNumbers() = default;
+  /// Uniform.
+  StrategyNumbers(int edges, Rng& rng);
+
+  int edges() const { return edges_; }
+  Strategy strategy() const;
+  /// Number i of those that steer a path of the strategy, in the order above.
+  double& steering(const Strategy& strategy, int i) { return numbers_[index(strategy, i)]; }
+  double steering(const Strategy& strategy, int i) const { return numbers_[index(strategy, i)]; }
+  /// That which chooses the lobe at vertex i of the subpath from the sensor, or from the light.
+  double sensor_lobe(int i) const { return at(kSensor + 4 + 3 * i); }
+  double light_lobe(int i) const { return at(light_begin() + 7 + 3 * i); }
+  /// Moves all of them as PrimarySample does.
+  void move(const PrimaryOptions& options, Rng& rng);
+  /// Moves all but those that steer a path of the strategy, and that which chooses it.
+  void move_choices(const Strategy& strategy, const PrimaryOptions& options, Rng& rng);
+
+  /// Hands out numbers from a first one on.
+  class Reader final : public UniformSource {
+   public:
+    explicit Reader(const double* first) : next_(first) {}
+    double next() override { return *next_++; }
+
+   private:
+    const double* next_;
+  };
+  /// Those of the sensor's subpath, of the light's, and of the connection.
+  Reader sensor() const { return Reader(&at(kSensor)); }
+  Reader light() const { return Reader(&at(light_begin())); }
+  Reader connection() const { return Reader(&at(connection_begin())); }
+
+ private:
+  // Places of the numbers: the strategy; the film, then three for each vertex; the emitter and the
+  // ray, then likewise; the emitter and the point.
+  static constexpr int kSensor = 1;
+  static constexpr int kMaxCount = 1 + 7 + 6 * kMaxPathLength + 3;
+  int light_begin() const { return kSensor + 2 + 3 * edges_; }
+  int connection_begin() const { return light_begin() + 5 + 3 * edges_; }
+  int count() const { return connection_begin() + 3; }
+
+  const double& at(int i) const { return numbers_[static_cast<std::size_t>(i)]; }
+  std::size_t index(const Strategy& strategy, int i) const;
+
+  int edges_ = 0;
+  std::array<double, kMaxCount> numbers_{};
+};
+
+/// What a strategy has found, but for what the numbers say.
+struct PrimaryPath {
+  Strategy strategy;
+  PathTopology topology;
+};
+PrimaryPath primary_path(const Scene& scene, const FoundPath& found);
+
+/// Derivatives of log I by the numbers that steer the path.
+struct PrimaryDerivatives {
+  Vector gradient;
+  Matrix hessian;  ///< if it was asked for
+};
+
+class PrimaryFunction {
+ public:
+  /// Light subpaths are those of the guide, which must outlive it.
+  PrimaryFunction(const Scene& scene, const EmissionGuide& guide) : scene_(scene), guide_(guide) {}
+
+  /// log(I / (n + 1)) by the walk along the path; NaN if a number leads off it.
+  double log_target(const StrategyNumbers& numbers, const PrimaryPath& path) const;
+  /// By Jets, and nested ones. False if something is not finite.
+  bool gradient(const StrategyNumbers& numbers, const PrimaryPath& path,
+                PrimaryDerivatives& result) const;
+  bool gradient_and_hessian(const StrategyNumbers& numbers, const PrimaryPath& path,
+                            PrimaryDerivatives& result) const;
+
+ private:
+  const Scene& scene_;
+  const EmissionGuide& guide_;
+};
+
+}  // namespace driftlight

@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+/// A path as a function of its numbers: the walk is the tracer's path, warps have their densities,
+/// and derivatives are those of the target.
+#include "primary_path.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "bsdf_warp.h"
+#include "driftlight/finite_difference.h"
+#include "emission_warp.h"
+#include "strategy_target.h"
+#include "support/test_scenes.h"
+
+namespace driftlight::test {
+namespace {
+
+struct Found {
+  StrategyNumbers numbers;
+  PrimaryPath path;
+  double target;
+};
+
+/// Points that carry light, at paths of 1 to 6 edges, at most `count` of each strategy.
+std::vector<Found> found_paths(const Scene& scene, int count, int tries, std::uint64_t seed) {
+  const EmissionGuide unguided(scene);
+  StrategyTarget target(scene, unguided, 6);
+  PrimaryPlace place;
+  std::map<std::pair<int, int>, int> counts;
+  std::vector<Found> result;
+  for (std::uint64_t i = 0; i < static_cast<std::uint64_t>(tries); ++i) {
+    Rng rng(seed, Stream::Test, i);
+    const StrategyNumbers numbers(1 + static_cast<int>(i % 6), rng);
+    const auto [s, t] = numbers.strategy();
+    if (counts[{s, t}] >= count) continue;
+    const auto path = target(numbers, place);
+    if (!path) continue;
+    ++counts[{s, t}];
+    result.push_back({numbers, *path, place.target});
+  }
+  return result;
+}
+
+/// Law: the walk in primary coordinates is the path of the tracer, and log f - log sum p its
+/// target.
+TEST(PrimaryPath, WalkHasTheTargetOfTheTracer) {
+  std::set<std::pair<PathEnd, bool>> ends;
+  for (const TestScene& test : test_scenes()) {
+    const EmissionGuide unguided(test.scene);
+    const PrimaryFunction function(test.scene, unguided);
+    std::set<std::pair<int, int>> strategies;
+    int count = 0;
+    for (const Found& found : found_paths(test.scene, 12, 6000, 11)) {
+      const auto [s, t] = found.path.strategy;
+      const double expected = std::log(found.target / (s + t));
+      const double y = function.log_target(found.numbers, found.path);
+      EXPECT_NEAR(y, expected, 1e-6 * (1.0 + std::abs(expected))) << test.name << s << ' ' << t;
+      strategies.emplace(s, t);
+      ends.emplace(found.path.topology.end, found.path.topology.has_light_side());
+      ++count;
+    }
+    EXPECT_GT(count, 40) << test.name;
+    EXPECT_GT(strategies.size(), 10U) << test.name;
+  }
+  // Each way to end; an environment also with a light side.
+  EXPECT_EQ(ends.size(), 9U);
+}
+
+/// Numbers with one that steers moved by h.
+StrategyNumbers displaced(const Found& found, int i, double h) {
+  StrategyNumbers numbers = found.numbers;
+  numbers.steering(found.path.strategy, i) += h;
+  return numbers;
+}
+
+/// How far number i may be moved within (0, 1), at most 1e-4.
+double room(const Found& found, int i) {
+  const double u = found.numbers.steering(found.path.strategy, i);
+  return std::min(1e-4, 0.2 * std::min(u, 1.0 - u));
+}
+
+/// Counts what agrees: functions that are piecewise smooth have a kink here and there.
+class Agreement {
+ public:
+  void add(double exact, const Derivative& numeric, double scale) {
+    if (!(numeric.error < 1e-3 * (scale + std::abs(exact)))) return;
+    ++count_;
+    const double tolerance = 20.0 * numeric.error + 1e-5 * (scale + std::abs(exact));
+    if (std::abs(exact - numeric.value) <= tolerance) ++agreed_;
+  }
+  int count() const { return count_; }
+  double share() const { return static_cast<double>(agreed_) / std::max(count_, 1); }
+
+ private:
+  int count_ = 0;
+  int agreed_ = 0;
+};
+
+TEST(PrimaryPath, GradientIsThatOfDifferences) {
+  for (const TestScene& test : test_scenes()) {
+    const EmissionGuide unguided(test.scene);
+    const PrimaryFunction function(test.scene, unguided);
+    Agreement agreement;
+    PrimaryDerivatives derivatives;
+    for (const Found& found : found_paths(test.scene, 6, 3000, 12)) {
+      if (!function.gradient(found.numbers, found.path, derivatives)) continue;
+      for (int i = 0; i < derivatives.gradient.size(); ++i) {
+        const auto f = [&](double h) {
+          return function.log_target(displaced(found, i, h), found.path);
+        };
+        agreement.add(derivatives.gradient[i], ridders(f, room(found, i)), 1.0);
+      }
+    }
+    EXPECT_GT(agreement.count(), 200) << test.name;
+    EXPECT_GT(agreement.share(), 0.99) << test.name;
+  }
+}
+
+TEST(PrimaryPath, HessianIsThatOfDifferencesOfGradients) {
+  for (const TestScene& test : test_scenes()) {
+    const EmissionGuide unguided(test.scene);
+    const PrimaryFunction function(test.scene, unguided);
+    Agreement agreement;
+    PrimaryDerivatives derivatives;
+    PrimaryDerivatives moved;
+    for (const Found& found : found_paths(test.scene, 2, 1500, 13)) {
+      if (!function.gradient_and_hessian(found.numbers, found.path, derivatives)) continue;
+      ASSERT_TRUE(function.gradient(found.numbers, found.path, moved));
+      EXPECT_LE((moved.gradient - derivatives.gradient).norm(),
+                1e-9 * (1.0 + moved.gradient.norm()));
+      const double scale = derivatives.hessian.cwiseAbs().maxCoeff();
+      for (int i = 0; i < derivatives.gradient.size(); i += 3) {
+        const int j = (2 * i + 1) % static_cast<int>(derivatives.gradient.size());
+        const auto f = [&](double h) {
+          function.gradient(displaced(found, i, h), found.path, moved);
+          return moved.gradient[j];
+        };
+        agreement.add(derivatives.hessian(i, j), ridders(f, room(found, i)), 1e-3 * scale + 1e-6);
+      }
+    }
+    EXPECT_GT(agreement.count(), 40) << test.name;
+    EXPECT_GT(agreement.share(), 0.98) << test.name;
+  }
+}
+
+using Jet2 = ceres::Jet<double, 2>;
+
+/// |dv / du1 x dv / du2|
+double area_of(const Vec3<Jet2>& v) {
+  const auto along = [&](int k) { return Vec3d(v.x().v[k], v.y().v[k], v.z().v[k]); };
+  return along(0).cross(along(1)).norm();
+}
+
+Vec3<Jet2> seeded(const Vec3d& u) { return {Jet2(u.x(), 0), Jet2(u.y(), 1), Jet2(u.z())}; }
+
+/// Law: a warp of density p magnifies areas by 1 / p, here p of the lobe taken: the density by
+/// which it is drawn, times the probability of the lobe.
+TEST(BsdfWarp, LobesMagnifyByTheirDensity) {
+  const Texture white(Rgbd::Ones());
+  const Texture half(Rgbd::Constant(0.5));
+  const Microfacets beckmann{Distribution::Beckmann, 0.2};
+  const Microfacets ggx{Distribution::Ggx, 0.3};
+  const RoughDielectric glass{ggx, 1.5, white, white};
+  const Phong phong{Texture(Rgbd::Zero()), white, 30};
+  const std::vector<Bsdf> bsdfs{Diffuse{half},
+                                RoughConductor{beckmann},
+                                RoughConductor{ggx},
+                                RoughDielectric{beckmann, 1.5, white, white},
+                                glass,
+                                phong,
+                                Phong{half, Texture(Rgbd::Zero()), 30}};
+  const SurfacePoint<double> at{Vec3d(0.3, -0.5, 0.8).normalized(), Vec2d(0.4, 0.3)};
+  const SurfacePoint<Jet2> at_jets{constant<Jet2>(at.n), constant<Jet2>(at.uv)};
+  Rng rng(14, Stream::Test, 0);
+  std::array<int, 2> sides{};
+  for (const Bsdf& bsdf : bsdfs) {
+    for (int i = 0; i < 300; ++i) {
+      Vec3d wi = square_to_sphere(rng.uniform(), rng.uniform());
+      if (!is_transmissive(bsdf) && at.n.dot(wi) < 0.0) wi = -wi;
+      const Vec3d u = rng.uniform3();
+      const auto next = sample(bsdf, at, wi, u);
+      const auto jets = warp<Jet2>(bsdf, at_jets, constant<Jet2>(wi), seeded(u));
+      ASSERT_EQ(next.has_value(), jets.has_value());
+      if (!next) continue;
+      ASSERT_LT((next->wo - value(jets->wo)).norm(), 1e-12);
+      double share = 1.0;
+      if (const auto* rough = std::get_if<RoughDielectric>(&bsdf)) {
+        const double eta = at.n.dot(wi) > 0.0 ? rough->eta : 1.0 / rough->eta;
+        const bool reflection = next->scattering == Scattering::Reflection;
+        ++sides[reflection ? 0 : 1];
+        const Vec3d h = (wi + (reflection ? 1.0 : eta) * next->wo).normalized();
+        const double fresnel = fresnel_dielectric(std::abs(wi.dot(h)), eta);
+        share = reflection ? fresnel : 1.0 - fresnel;
+      }
+      EXPECT_NEAR(area_of(jets->wo) * pdf(bsdf, at, wi, next->wo) / share, 1.0, 1e-6) << i;
+    }
+  }
+  EXPECT_GT(std::min(sides[0], sides[1]), 50);
+}
+
+TEST(EmissionWarp, PointsAndDirectionsMagnifyByTheirDensity) {
+  Rng rng(15, Stream::Test, 0);
+  std::set<std::size_t> kinds;
+  for (const TestScene& test : test_scenes()) {
+    for (const Emitter& emitter : test.scene.emitters()) {
+      for (int i = 0; i < 50; ++i) {
+        const Vec3<Jet2> u = seeded(rng.uniform3());
+        double density = 0;
+        Vec3<Jet2> y;
+        if (const auto* area = std::get_if<AreaEmitter>(&emitter)) {
+          const Shape& shape = test.scene.shapes()[area->shape];
+          y = warp_area(shape, u.x(), u.y()).p;
+          density = 1.0 / shape.extent.area;
+        } else if (is_environment(emitter)) {
+          y = warp_environment(emitter, u.x(), u.y());
+          const auto* map = std::get_if<EnvironmentMap>(&emitter);
+          density = map != nullptr ? map->pdf(value(y)) : 0.25 * kInvPi;
+        } else if (const auto* spot = std::get_if<SpotEmitter>(&emitter)) {
+          y = spot->sample(u.x(), u.y());
+          density = spot->falloff(value(y)) / spot->solid_angle();
+          EXPECT_LT((value(y) - spot->sample(value(u.x()), value(u.y()))).norm(), 1e-12);
+        } else {
+          continue;
+        }
+        kinds.insert(emitter.index());
+        // Interpolated meshes are flat for the sampler: their areas are those of their triangles.
+        EXPECT_NEAR(area_of(y) * density, 1.0, 1e-6) << test.name << emitter.index();
+      }
+    }
+  }
+  EXPECT_EQ(kinds.size(), 4U);
+}
+
+}  // namespace
+}  // namespace driftlight::test
