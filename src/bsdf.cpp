@@ -31,7 +31,7 @@ double pdf_bsdf(const Diffuse&, const Point& at, const Vec3d& wi, const Vec3d& w
 std::optional<BsdfSample> sample_bsdf(const Conductor&, const Point& at, const Vec3d& wi,
                                       const Vec3d&) {
   if (at.n.dot(wi) <= 0.0) return std::nullopt;
-  return BsdfSample{reflect(wi, at.n), Scattering::Reflection};
+  return BsdfSample{reflect(wi, at.n), Scattering::Reflection, true};
 }
 
 double pdf_bsdf(const Conductor&, const Point&, const Vec3d&, const Vec3d&) { return 0.0; }
@@ -52,16 +52,13 @@ double pdf_bsdf(const RoughConductor& b, const Point& at, const Vec3d& wi, const
   return b.microfacets.pdf(cos_i, at.n.dot(h), ih) / (4.0 * ih);
 }
 
-double reflection_probability(const Dielectric& b, double cos_i) {
-  return fresnel_dielectric(std::abs(cos_i), cos_i > 0.0 ? b.eta : 1.0 / b.eta);
-}
-
 std::optional<BsdfSample> sample_bsdf(const Dielectric& b, const Point& at, const Vec3d& wi,
                                       const Vec3d& u) {
   const double cos_i = at.n.dot(wi);
-  if (u.z() < reflection_probability(b, cos_i))
-    return BsdfSample{reflect(wi, at.n), Scattering::Reflection};
-  return BsdfSample{refract(wi, at.n, cos_i > 0.0 ? b.eta : 1.0 / b.eta), Scattering::Transmission};
+  if (u.z() < detail::interface_reflectance(b.eta, cos_i))
+    return BsdfSample{reflect(wi, at.n), Scattering::Reflection, true};
+  const Vec3d wo = refract(wi, at.n, cos_i > 0.0 ? b.eta : 1.0 / b.eta);
+  return BsdfSample{wo, Scattering::Transmission, true};
 }
 
 double pdf_bsdf(const Dielectric&, const Point&, const Vec3d&, const Vec3d&) { return 0.0; }
@@ -127,17 +124,187 @@ double pdf_bsdf(const Phong& b, const Point& at, const Vec3d& wi, const Vec3d& w
   return s * lobe + (1.0 - s) * cos_o * kInvPi;
 }
 
+/// 2 int F cos d cos, by Simpson's rule.
+double diffuse_fresnel(double eta) {
+  constexpr int kSteps = 512;
+  double sum = 0.0;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double weight = i == 0 || i == kSteps ? 1.0 : i % 2 == 1 ? 4.0 : 2.0;
+    const double cosine = static_cast<double>(i) / kSteps;
+    sum += weight * cosine * fresnel_dielectric(cosine, eta);
+  }
+  return 2.0 * sum / (3.0 * kSteps);
+}
+
+/// The coat is taken in proportion to T and F, and to what base and coat reflect.
+double coat_probability(double reflected, const Texture& coat, const Texture& base,
+                        const Vec2d& uv) {
+  const double specular = reflected * luminance(coat.eval(uv));
+  const double diffuse = (1.0 - reflected) * luminance(base.eval(uv));
+  return specular + diffuse > 0.0 ? specular / (specular + diffuse) : 0.0;
+}
+
+double coat_probability(const Plastic& b, double cos_i, const Vec2d& uv) {
+  return coat_probability(fresnel_dielectric(cos_i, b.eta), b.specular_reflectance,
+                          b.base.reflectance, uv);
+}
+double coat_probability(const RoughPlastic& b, double cos_i, const Vec2d& uv) {
+  return coat_probability(1.0 - b.transmittance.eval(cos_i), b.specular_reflectance,
+                          b.base.reflectance, uv);
+}
+
+std::optional<BsdfSample> sample_bsdf(const Plastic& b, const Point& at, const Vec3d& wi,
+                                      const Vec3d& u) {
+  const double cos_i = at.n.dot(wi);
+  if (cos_i <= 0.0) return std::nullopt;
+  if (u.z() < coat_probability(b, cos_i, at.uv))
+    return BsdfSample{reflect(wi, at.n), Scattering::Reflection, true};
+  return reflected(to_world(square_to_cosine_hemisphere(u.x(), u.y()), at.n), wi, at.n);
+}
+
+double pdf_bsdf(const Plastic& b, const Point& at, const Vec3d& wi, const Vec3d& wo) {
+  const double cos_i = at.n.dot(wi);
+  if (cos_i <= 0.0) return 0.0;
+  return (1.0 - coat_probability(b, cos_i, at.uv)) * std::max(0.0, at.n.dot(wo)) * kInvPi;
+}
+
+std::optional<BsdfSample> sample_bsdf(const RoughPlastic& b, const Point& at, const Vec3d& wi,
+                                      const Vec3d& u) {
+  const double cos_i = at.n.dot(wi);
+  if (cos_i <= 0.0) return std::nullopt;
+  if (!(u.z() < coat_probability(b, cos_i, at.uv)))
+    return reflected(to_world(square_to_cosine_hemisphere(u.x(), u.y()), at.n), wi, at.n);
+  const Vec3d h = to_world(b.microfacets.sample(to_local(wi, at.n), u.x(), u.y()), at.n);
+  return reflected(reflect(wi, h), wi, at.n);
+}
+
+double pdf_bsdf(const RoughPlastic& b, const Point& at, const Vec3d& wi, const Vec3d& wo) {
+  const double cos_i = at.n.dot(wi);
+  const double cos_o = at.n.dot(wo);
+  if (cos_i <= 0.0 || cos_o <= 0.0) return 0.0;
+  const double coat = coat_probability(b, cos_i, at.uv);
+  const Vec3d h = (wi + wo).normalized();
+  const double ih = wi.dot(h);
+  return coat * b.microfacets.pdf(cos_i, at.n.dot(h), ih) / (4.0 * ih) +
+         (1.0 - coat) * cos_o * kInvPi;
+}
+
+std::optional<BsdfSample> sample_bsdf(const ThinDielectric& b, const Point& at, const Vec3d& wi,
+                                      const Vec3d& u) {
+  const double r = fresnel_dielectric(std::abs(at.n.dot(wi)), b.eta);
+  if (u.z() < 2.0 * r / (1.0 + r))
+    return BsdfSample{reflect(wi, at.n), Scattering::Reflection, true};
+  return BsdfSample{-wi, Scattering::Transmission, true};
+}
+
+double pdf_bsdf(const ThinDielectric&, const Point&, const Vec3d&, const Vec3d&) { return 0.0; }
+
+/// With which the nested BSDF is sampled.
+double nested_probability(const Mask& b, const Vec2d& uv) {
+  return std::clamp(luminance(b.opacity.eval(uv)), 0.0, 1.0);
+}
+
+std::optional<BsdfSample> sample_bsdf(const Mask& b, const Point& at, const Vec3d& wi,
+                                      const Vec3d& u) {
+  const double p = nested_probability(b, at.uv);
+  if (!(u.z() < p)) return BsdfSample{-wi, Scattering::Transmission, true};
+  if (b.nested == nullptr) return std::nullopt;
+  return sample(b.nested->bsdf, at, wi, {u.x(), u.y(), u.z() / p});
+}
+
+double pdf_bsdf(const Mask& b, const Point& at, const Vec3d& wi, const Vec3d& wo) {
+  if (b.nested == nullptr) return 0.0;
+  return nested_probability(b, at.uv) * pdf(b.nested->bsdf, at, wi, wo);
+}
+
+double delta_probability_of(const Conductor&, const Point&, const Vec3d&, Scattering scattering) {
+  return scattering == Scattering::Reflection ? 1.0 : 0.0;
+}
+double delta_probability_of(const Dielectric& b, const Point& at, const Vec3d& wi,
+                            Scattering scattering) {
+  const double reflection = detail::interface_reflectance(b.eta, at.n.dot(wi));
+  return scattering == Scattering::Reflection ? reflection : 1.0 - reflection;
+}
+double delta_probability_of(const ThinDielectric& b, const Point& at, const Vec3d& wi,
+                            Scattering scattering) {
+  const double r = fresnel_dielectric(std::abs(at.n.dot(wi)), b.eta);
+  return (scattering == Scattering::Reflection ? 2.0 * r : 1.0 - r) / (1.0 + r);
+}
+double delta_probability_of(const Plastic& b, const Point& at, const Vec3d& wi,
+                            Scattering scattering) {
+  const double cos_i = at.n.dot(wi);
+  if (scattering == Scattering::Transmission || cos_i <= 0.0) return 0.0;
+  return coat_probability(b, cos_i, at.uv);
+}
+double delta_probability_of(const Mask& b, const Point& at, const Vec3d& wi,
+                            Scattering scattering) {
+  const double p = nested_probability(b, at.uv);
+  double result = scattering == Scattering::Transmission ? 1.0 - p : 0.0;
+  if (b.nested != nullptr) result += p * delta_probability(b.nested->bsdf, at, wi, scattering);
+  return result;
+}
+/// Those that have no delta lobe.
+template <class B>
+double delta_probability_of(const B&, const Point&, const Vec3d&, Scattering) {
+  return 0.0;
+}
+
 }  // namespace
 
+Plastic::Plastic(double index, const Texture& diffuse, const Texture& specular, bool nonlinear)
+    : eta(index), specular_reflectance(specular), base{diffuse, nonlinear} {
+  // What comes out from within is what goes in from without, by eta^2: n^2 |cos| d omega is kept.
+  base.inverse_eta2 = 1.0 / (eta * eta);
+  base.internal_reflectance = 1.0 - (1.0 - diffuse_fresnel(eta)) * base.inverse_eta2;
+}
+
+RoughPlastic::RoughPlastic(const Microfacets& facets, double index, const Texture& diffuse,
+                           const Texture& specular, bool nonlinear)
+    : microfacets(facets),
+      eta(index),
+      specular_reflectance(specular),
+      base{diffuse, nonlinear},
+      transmittance(facets, index) {
+  base.inverse_eta2 = 1.0 / (eta * eta);
+  base.internal_reflectance = 1.0 - RoughTransmittance(facets, 1.0 / eta).diffuse();
+}
+
 bool is_delta(const Bsdf& bsdf) {
-  return std::holds_alternative<Conductor>(bsdf) || std::holds_alternative<Dielectric>(bsdf);
+  if (const auto* mask = std::get_if<Mask>(&bsdf))
+    return mask->nested == nullptr || is_delta(mask->nested->bsdf);
+  return std::holds_alternative<Conductor>(bsdf) || std::holds_alternative<Dielectric>(bsdf) ||
+         std::holds_alternative<ThinDielectric>(bsdf);
+}
+
+bool has_delta(const Bsdf& bsdf, Scattering scattering) {
+  if (std::holds_alternative<Dielectric>(bsdf) || std::holds_alternative<ThinDielectric>(bsdf))
+    return true;
+  if (const auto* mask = std::get_if<Mask>(&bsdf))
+    return scattering == Scattering::Transmission ||
+           (mask->nested != nullptr && has_delta(mask->nested->bsdf, scattering));
+  const bool reflects =
+      std::holds_alternative<Conductor>(bsdf) || std::holds_alternative<Plastic>(bsdf);
+  return reflects && scattering == Scattering::Reflection;
 }
 
 bool is_transmissive(const Bsdf& bsdf) {
-  return std::holds_alternative<Dielectric>(bsdf) || std::holds_alternative<RoughDielectric>(bsdf);
+  if (const auto* mask = std::get_if<Mask>(&bsdf))
+    return mask->nested == nullptr || is_transmissive(mask->nested->bsdf);
+  return std::holds_alternative<Dielectric>(bsdf) ||
+         std::holds_alternative<RoughDielectric>(bsdf) ||
+         std::holds_alternative<ThinDielectric>(bsdf);
 }
 
-bool is_diffuse(const Bsdf& bsdf) { return std::holds_alternative<Diffuse>(bsdf); }
+bool is_diffuse(const Bsdf& bsdf) {
+  if (const auto* mask = std::get_if<Mask>(&bsdf))
+    return mask->nested != nullptr && is_diffuse(mask->nested->bsdf);
+  return std::holds_alternative<Diffuse>(bsdf) || std::holds_alternative<Plastic>(bsdf);
+}
+
+double delta_eta(const Bsdf& bsdf) {
+  const auto* glass = std::get_if<Dielectric>(&bsdf);
+  return glass != nullptr ? glass->eta : 1.0;
+}
 
 std::optional<BsdfSample> sample(const Bsdf& bsdf, const SurfacePoint<double>& at, const Vec3d& wi,
                                  const Vec3d& u) {
@@ -150,10 +317,8 @@ double pdf(const Bsdf& bsdf, const SurfacePoint<double>& at, const Vec3d& wi, co
 
 double delta_probability(const Bsdf& bsdf, const SurfacePoint<double>& at, const Vec3d& wi,
                          Scattering scattering) {
-  const auto* glass = std::get_if<Dielectric>(&bsdf);
-  if (glass == nullptr) return scattering == Scattering::Reflection ? 1.0 : 0.0;
-  const double reflection = reflection_probability(*glass, at.n.dot(wi));
-  return scattering == Scattering::Reflection ? reflection : 1.0 - reflection;
+  return std::visit([&](const auto& b) { return delta_probability_of(b, at, wi, scattering); },
+                    bsdf);
 }
 
 }  // namespace driftlight

@@ -63,7 +63,7 @@ class Recorder : public WalkVisitor<double> {
     const Vec3d& n_g = e.at.n_g;
     x.etendue = std::abs(n_s.dot(e.wi) * n_g.dot(e.wo) / (n_s.dot(e.wo) * n_g.dot(e.wi)));
     if (e.scattering == Scattering::Transmission) {
-      const double eta = std::get<Dielectric>(e.bsdf).eta;
+      const double eta = delta_eta(e.bsdf);
       const double beyond = n_s.dot(e.wi) > 0.0 ? eta : 1.0 / eta;
       x.etendue /= beyond * beyond;
     }
