@@ -100,9 +100,9 @@ class TwoSidedTracer {
     if (surface->bsdf == nullptr) return TraceStatus::Missed;
     // A ray that just touches a sphere in single precision may pass it in double.
     if (!surface->at.p.allFinite()) return TraceStatus::Missed;
-    lobes_[index] = lobe_of(*surface->bsdf);
     const PathVertex& wanted = pattern_.vertices[index];
-    if ((lobes_[index] == Lobe::Delta) != wanted.delta) return TraceStatus::OtherLobe;
+    if (!has_lobe(*surface->bsdf, wanted)) return TraceStatus::OtherLobe;
+    lobes_[index] = lobe_of(*surface->bsdf, wanted.delta);
     result_.vertices[index] = wanted;
     result_.vertices[index].hit = hit;
     return TraceStatus::Ok;
@@ -113,8 +113,6 @@ class TwoSidedTracer {
     const PathVertex& wanted = pattern_.vertices[static_cast<std::size_t>(k)];
     Vec3d next;
     if (wanted.delta) {
-      if (wanted.scattering == Scattering::Transmission && !is_transmissive(*surface.bsdf))
-        return TraceStatus::OtherLobe;
       next = delta_direction(*surface.bsdf, surface.surface(), surface.wi, wanted.scattering);
       if (!next.allFinite()) return TraceStatus::OtherLobe;  // total reflection
     } else {

@@ -62,17 +62,17 @@ class BidirectionalTracer {
       const SubpathVertex& z = from_sensor_[t - 2];
       hit_area(z, t, sink);
       if (t > 2) see_blurred(z, t, sink);
-      if (z.delta || t > max_depth_) continue;
+      if (!z.connects || t > max_depth_) continue;
       if (scene_.samples_emitters()) connect_to_light(z, t, numbers.connection, sink);
       for (int s = 2; s < from_light_.size() + 2 && s + t <= max_depth_ + 1; ++s)
-        if (!from_light_[s - 2].delta) connect(z, t, from_light_[s - 2], s, sink);
+        if (from_light_[s - 2].connects) connect(z, t, from_light_[s - 2], s, sink);
     }
     if (escape) {
       hit_environment(*escape, sink);
       see_blurred(*escape, sink);
     }
     for (int s = 2; s < from_light_.size() + 2; ++s)
-      if (!from_light_[s - 2].delta) connect_to_sensor(from_light_[s - 2], s, sink);
+      if (from_light_[s - 2].connects) connect_to_sensor(from_light_[s - 2], s, sink);
   }
 
   /// What strategy (s, t) alone finds, with its weight among all. Blurred lamps are not seen.
@@ -84,14 +84,14 @@ class BidirectionalTracer {
     if (s > 1) {
       if (!scene_.samples_emitters()) return;
       trace_from_light(s - 1, numbers.light);
-      if (from_light_.size() < s - 1 || from_light_[s - 2].delta) return;
+      if (from_light_.size() < s - 1 || !from_light_[s - 2].connects) return;
       if (t == 1) return connect_to_sensor(from_light_[s - 2], s, sink);
     }
     if (s == 0 && escape && from_sensor_.size() == t - 2) return hit_environment(*escape, sink);
     if (from_sensor_.size() < t - 1) return;
     const SubpathVertex& z = from_sensor_[t - 2];
     if (s == 0) return hit_area(z, t, sink);
-    if (z.delta) return;
+    if (!z.connects) return;
     if (s > 1) return connect(z, t, from_light_[s - 2], s, sink);
     if (scene_.samples_emitters()) connect_to_light(z, t, numbers.connection, sink);
   }

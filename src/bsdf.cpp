@@ -4,21 +4,81 @@
 #include "bsdf_warp.h"
 
 namespace driftlight {
+namespace {
+
+/// 2 int F cos d cos, by Simpson's rule.
+double diffuse_fresnel(double eta) {
+  constexpr int kSteps = 512;
+  double sum = 0.0;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double weight = i == 0 || i == kSteps ? 1.0 : i % 2 == 1 ? 4.0 : 2.0;
+    const double cosine = static_cast<double>(i) / kSteps;
+    sum += weight * cosine * fresnel_dielectric(cosine, eta);
+  }
+  return 2.0 * sum / (3.0 * kSteps);
+}
+
+}  // namespace
+
+Plastic::Plastic(double index, const Texture& diffuse, const Texture& specular, bool nonlinear)
+    : eta(index), specular_reflectance(specular), base{diffuse, nonlinear} {
+  // What comes out from within is what goes in from without, by eta^2: n^2 |cos| d omega is kept.
+  base.inverse_eta2 = 1.0 / (eta * eta);
+  base.internal_reflectance = 1.0 - (1.0 - diffuse_fresnel(eta)) * base.inverse_eta2;
+}
+
+RoughPlastic::RoughPlastic(const Microfacets& facets, double index, const Texture& diffuse,
+                           const Texture& specular, bool nonlinear)
+    : microfacets(facets),
+      eta(index),
+      specular_reflectance(specular),
+      base{diffuse, nonlinear},
+      transmittance(facets, index) {
+  base.inverse_eta2 = 1.0 / (eta * eta);
+  base.internal_reflectance = 1.0 - RoughTransmittance(facets, 1.0 / eta).diffuse();
+}
 
 bool is_delta(const Bsdf& bsdf) {
-  return std::holds_alternative<Conductor>(bsdf) || std::holds_alternative<Dielectric>(bsdf);
+  if (const auto* mask = std::get_if<Mask>(&bsdf))
+    return mask->nested == nullptr || is_delta(mask->nested->bsdf);
+  return std::holds_alternative<Conductor>(bsdf) || std::holds_alternative<Dielectric>(bsdf) ||
+         std::holds_alternative<ThinDielectric>(bsdf);
+}
+
+bool has_delta(const Bsdf& bsdf, Scattering scattering) {
+  if (std::holds_alternative<Dielectric>(bsdf) || std::holds_alternative<ThinDielectric>(bsdf))
+    return true;
+  if (const auto* mask = std::get_if<Mask>(&bsdf))
+    return scattering == Scattering::Transmission ||
+           (mask->nested != nullptr && has_delta(mask->nested->bsdf, scattering));
+  const bool reflects =
+      std::holds_alternative<Conductor>(bsdf) || std::holds_alternative<Plastic>(bsdf);
+  return reflects && scattering == Scattering::Reflection;
 }
 
 bool is_transmissive(const Bsdf& bsdf) {
-  return std::holds_alternative<Dielectric>(bsdf) || std::holds_alternative<RoughDielectric>(bsdf);
+  if (const auto* mask = std::get_if<Mask>(&bsdf))
+    return mask->nested == nullptr || is_transmissive(mask->nested->bsdf);
+  return std::holds_alternative<Dielectric>(bsdf) ||
+         std::holds_alternative<RoughDielectric>(bsdf) ||
+         std::holds_alternative<ThinDielectric>(bsdf);
 }
 
-bool is_diffuse(const Bsdf& bsdf) { return std::holds_alternative<Diffuse>(bsdf); }
+bool is_diffuse(const Bsdf& bsdf) {
+  if (const auto* mask = std::get_if<Mask>(&bsdf))
+    return mask->nested != nullptr && is_diffuse(mask->nested->bsdf);
+  return std::holds_alternative<Diffuse>(bsdf) || std::holds_alternative<Plastic>(bsdf);
+}
+
+double delta_eta(const Bsdf& bsdf) {
+  const auto* glass = std::get_if<Dielectric>(&bsdf);
+  return glass != nullptr ? glass->eta : 1.0;
+}
 
 std::optional<BsdfSample> sample(const Bsdf& bsdf, const SurfacePoint<double>& at, const Vec3d& wi,
                                  const Vec3d& u) {
   const auto next = warp<double>(bsdf, at, wi, u);
-  return next ? std::optional(BsdfSample{next->wo, next->scattering}) : std::nullopt;
+  return next ? std::optional(BsdfSample{next->wo, next->scattering, next->delta}) : std::nullopt;
 }
 
 double pdf(const Bsdf& bsdf, const SurfacePoint<double>& at, const Vec3d& wi, const Vec3d& wo) {

@@ -28,6 +28,22 @@ void for_each_texture(const Bsdf& bsdf, const Visit& visit) {
       visit(b.diffuse_reflectance);
       visit(b.specular_reflectance);
     }
+    void operator()(const Plastic& b) const {
+      visit(b.base.reflectance);
+      visit(b.specular_reflectance);
+    }
+    void operator()(const RoughPlastic& b) const {
+      visit(b.base.reflectance);
+      visit(b.specular_reflectance);
+    }
+    void operator()(const ThinDielectric& b) const {
+      visit(b.specular_reflectance);
+      visit(b.specular_transmittance);
+    }
+    void operator()(const Mask& b) const {
+      visit(b.opacity);
+      if (b.nested != nullptr) for_each_texture(b.nested->bsdf, visit);
+    }
   };
   std::visit(Visitor{visit}, bsdf);
 }

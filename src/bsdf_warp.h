@@ -18,7 +18,24 @@ template <Scalar T>
 struct WarpedDirection {
   Vec3<T> wo;
   Scattering scattering;
+  bool delta = false;  ///< by a delta lobe
 };
+
+/// `sample`: wo from three numbers in [0, 1), of which the last chooses the lobe.
+template <Scalar T>
+std::optional<WarpedDirection<T>> warp(const Bsdf& bsdf, const SurfacePoint<T>& at,
+                                       const Vec3<T>& wi, const Vec3<T>& u);
+
+/// `pdf`, with derivatives.
+template <Scalar T>
+T pdf_of(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& wo);
+
+/// `delta_probability`, with derivatives.
+template <Scalar T>
+T delta_probability_of(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                       Scattering scattering);
+
+// ---------------------------------------------------------------------------------------------
 
 namespace detail {
 
@@ -55,7 +72,7 @@ template <Scalar T>
 Warped<T> warp_bsdf(const Conductor&, const SurfacePoint<T>& at, const Vec3<T>& wi,
                     const Vec3<T>&) {
   if (value(at.n).dot(value(wi)) <= 0.0) return std::nullopt;
-  return WarpedDirection<T>{reflect(wi, at.n), Scattering::Reflection};
+  return WarpedDirection<T>{reflect(wi, at.n), Scattering::Reflection, true};
 }
 
 template <Scalar T>
@@ -83,19 +100,13 @@ T pdf_bsdf(const RoughConductor& b, const SurfacePoint<T>& at, const Vec3<T>& wi
 }
 
 template <Scalar T>
-T reflection_probability(const Dielectric& b, const T& cos_i) {
-  using std::abs;
-  return fresnel_dielectric(T(abs(cos_i)), value(cos_i) > 0.0 ? b.eta : 1.0 / b.eta);
-}
-
-template <Scalar T>
 Warped<T> warp_bsdf(const Dielectric& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
                     const Vec3<T>& u) {
   const double cos_i = value(at.n).dot(value(wi));
-  if (value(u.z()) < reflection_probability(b, cos_i))
-    return WarpedDirection<T>{reflect(wi, at.n), Scattering::Reflection};
+  if (value(u.z()) < interface_reflectance(b.eta, cos_i))
+    return WarpedDirection<T>{reflect(wi, at.n), Scattering::Reflection, true};
   return WarpedDirection<T>{refract(wi, at.n, cos_i > 0.0 ? b.eta : 1.0 / b.eta),
-                            Scattering::Transmission};
+                            Scattering::Transmission, true};
 }
 
 template <Scalar T>
@@ -186,29 +197,172 @@ T pdf_bsdf(const Phong& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const V
   return s * lobe + (1.0 - s) * cos_o * kInvPi;
 }
 
+/// With which the coat is taken: in proportion to F and T, and to what coat and base reflect.
+template <Scalar T>
+T coat_probability(const T& reflected, const Texture& coat, const Texture& base,
+                   const Vec2<T>& uv) {
+  const T specular = reflected * luminance(coat.eval(uv));
+  const T diffuse = (1.0 - reflected) * luminance(base.eval(uv));
+  const T sum = specular + diffuse;
+  return value(sum) > 0.0 ? T(specular / sum) : constant<T>(0.0);
+}
+template <Scalar T>
+T coat_probability(const Plastic& b, const T& cos_i, const Vec2<T>& uv) {
+  return coat_probability<T>(fresnel_dielectric(cos_i, b.eta), b.specular_reflectance,
+                             b.base.reflectance, uv);
+}
+template <Scalar T>
+T coat_probability(const RoughPlastic& b, const T& cos_i, const Vec2<T>& uv) {
+  return coat_probability<T>(1.0 - b.transmittance.eval(cos_i), b.specular_reflectance,
+                             b.base.reflectance, uv);
+}
+
+/// The number u chooses the coat.
+template <Scalar T, class B>
+bool takes_coat(const B& b, const SurfacePoint<T>& at, double cos_i, const T& u) {
+  const Vec2d uv{value(at.uv.x()), value(at.uv.y())};
+  return value(u) < coat_probability<double>(b, cos_i, uv);
+}
+
+template <Scalar T>
+Warped<T> warp_bsdf(const Plastic& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                    const Vec3<T>& u) {
+  const double cos_i = value(at.n).dot(value(wi));
+  if (cos_i <= 0.0) return std::nullopt;
+  if (takes_coat(b, at, cos_i, u.z()))
+    return WarpedDirection<T>{reflect(wi, at.n), Scattering::Reflection, true};
+  return reflected<T>(warp_diffuse(at.n, u), wi, at.n);
+}
+
+template <Scalar T>
+T pdf_bsdf(const Plastic& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& wo) {
+  const T cos_i = dot(at.n, wi);
+  const T cos_o = dot(at.n, wo);
+  if (value(cos_i) <= 0.0 || value(cos_o) <= 0.0) return constant<T>(0.0);
+  return (1.0 - coat_probability<T>(b, cos_i, at.uv)) * cos_o * kInvPi;
+}
+
+template <Scalar T>
+Warped<T> warp_bsdf(const RoughPlastic& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                    const Vec3<T>& u) {
+  const double cos_i = value(at.n).dot(value(wi));
+  if (cos_i <= 0.0) return std::nullopt;
+  if (!takes_coat(b, at, cos_i, u.z())) return reflected<T>(warp_diffuse(at.n, u), wi, at.n);
+  const Vec3<T> h = to_world<T>(b.microfacets.sample<T>(to_local<T>(wi, at.n), u.x(), u.y()), at.n);
+  return reflected<T>(reflect(wi, h), wi, at.n);
+}
+
+template <Scalar T>
+T pdf_bsdf(const RoughPlastic& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& wo) {
+  const T cos_i = dot(at.n, wi);
+  const T cos_o = dot(at.n, wo);
+  if (value(cos_i) <= 0.0 || value(cos_o) <= 0.0) return constant<T>(0.0);
+  const T coat = coat_probability<T>(b, cos_i, at.uv);
+  const Vec3<T> h = unit<T>(wi + wo);
+  const T ih = dot(wi, h);
+  return coat * b.microfacets.pdf<T>(cos_i, dot(at.n, h), ih) / (4.0 * ih) +
+         (1.0 - coat) * cos_o * kInvPi;
+}
+
+/// F of one face; the pane reflects 2 F / (1 + F), with all that goes to and fro within.
+template <Scalar T>
+T face_reflectance(const ThinDielectric& b, const SurfacePoint<T>& at, const Vec3<T>& wi) {
+  using std::abs;
+  return fresnel_dielectric(T(abs(dot(at.n, wi))), b.eta);
+}
+
+template <Scalar T>
+Warped<T> warp_bsdf(const ThinDielectric& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                    const Vec3<T>& u) {
+  const double r = fresnel_dielectric(std::abs(value(at.n).dot(value(wi))), b.eta);
+  if (value(u.z()) < 2.0 * r / (1.0 + r))
+    return WarpedDirection<T>{reflect(wi, at.n), Scattering::Reflection, true};
+  return WarpedDirection<T>{-wi, Scattering::Transmission, true};
+}
+
+template <Scalar T>
+T pdf_bsdf(const ThinDielectric&, const SurfacePoint<T>&, const Vec3<T>&, const Vec3<T>&) {
+  return constant<T>(0.0);
+}
+
+/// With which the nested BSDF is sampled.
+template <Scalar T>
+T nested_probability(const Mask& b, const Vec2<T>& uv) {
+  const T p = luminance(b.opacity.eval(uv));
+  if (value(p) <= 0.0) return constant<T>(0.0);
+  return value(p) < 1.0 ? p : constant<T>(1.0);
+}
+
+template <Scalar T>
+Warped<T> warp_bsdf(const Mask& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& u) {
+  const double p = nested_probability<double>(b, {value(at.uv.x()), value(at.uv.y())});
+  if (!(value(u.z()) < p)) return WarpedDirection<T>{-wi, Scattering::Transmission, true};
+  if (b.nested == nullptr) return std::nullopt;
+  return warp<T>(b.nested->bsdf, at, wi, Vec3<T>(u.x(), u.y(), constant<T>(value(u.z()) / p)));
+}
+
+template <Scalar T>
+T pdf_bsdf(const Mask& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& wo) {
+  if (b.nested == nullptr) return constant<T>(0.0);
+  return nested_probability<T>(b, at.uv) * pdf_of<T>(b.nested->bsdf, at, wi, wo);
+}
+
+template <Scalar T>
+T probability_of_delta(const Conductor&, const SurfacePoint<T>&, const Vec3<T>&,
+                       Scattering scattering) {
+  return constant<T>(scattering == Scattering::Reflection ? 1.0 : 0.0);
+}
+template <Scalar T>
+T probability_of_delta(const Dielectric& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                       Scattering scattering) {
+  const T reflection = interface_reflectance(b.eta, T(dot(at.n, wi)));
+  return scattering == Scattering::Reflection ? reflection : T(1.0 - reflection);
+}
+template <Scalar T>
+T probability_of_delta(const ThinDielectric& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                       Scattering scattering) {
+  const T r = face_reflectance(b, at, wi);
+  return (scattering == Scattering::Reflection ? T(2.0 * r) : T(1.0 - r)) / (1.0 + r);
+}
+template <Scalar T>
+T probability_of_delta(const Plastic& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                       Scattering scattering) {
+  const T cos_i = dot(at.n, wi);
+  if (scattering == Scattering::Transmission || value(cos_i) <= 0.0) return constant<T>(0.0);
+  return coat_probability<T>(b, cos_i, at.uv);
+}
+template <Scalar T>
+T probability_of_delta(const Mask& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                       Scattering scattering) {
+  const T p = nested_probability<T>(b, at.uv);
+  const T through = scattering == Scattering::Transmission ? T(1.0 - p) : constant<T>(0.0);
+  if (b.nested == nullptr) return through;
+  return through + p * delta_probability_of<T>(b.nested->bsdf, at, wi, scattering);
+}
+/// Those that have no delta lobe.
+template <Scalar T, class B>
+T probability_of_delta(const B&, const SurfacePoint<T>&, const Vec3<T>&, Scattering) {
+  return constant<T>(0.0);
+}
+
 }  // namespace detail
 
-/// `sample`: wo from three numbers in [0, 1), of which the last chooses the lobe.
 template <Scalar T>
 std::optional<WarpedDirection<T>> warp(const Bsdf& bsdf, const SurfacePoint<T>& at,
                                        const Vec3<T>& wi, const Vec3<T>& u) {
   return std::visit([&](const auto& b) { return detail::warp_bsdf<T>(b, at, wi, u); }, bsdf);
 }
 
-/// `pdf`, with derivatives.
 template <Scalar T>
 T pdf_of(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& wo) {
   return std::visit([&](const auto& b) { return detail::pdf_bsdf<T>(b, at, wi, wo); }, bsdf);
 }
 
-/// `delta_probability`, with derivatives.
 template <Scalar T>
 T delta_probability_of(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi,
                        Scattering scattering) {
-  const auto* glass = std::get_if<Dielectric>(&bsdf);
-  if (glass == nullptr) return constant<T>(scattering == Scattering::Reflection ? 1.0 : 0.0);
-  const T reflection = detail::reflection_probability<T>(*glass, dot(at.n, wi));
-  return scattering == Scattering::Reflection ? reflection : T(1.0 - reflection);
+  return std::visit(
+      [&](const auto& b) { return detail::probability_of_delta(b, at, wi, scattering); }, bsdf);
 }
 
 }  // namespace driftlight

@@ -43,8 +43,8 @@ bool has_no_light_side(const Scene& scene, const Emitter& emitter) {
 
 }  // namespace
 
-Lobe lobe_of(const Bsdf& bsdf) {
-  if (is_delta(bsdf)) return Lobe::Delta;
+Lobe lobe_of(const Bsdf& bsdf, bool delta) {
+  if (delta) return Lobe::Delta;
   return is_diffuse(bsdf) ? Lobe::Wide : Lobe::Narrow;
 }
 

@@ -80,7 +80,7 @@ class DensityVisitor : public WalkVisitor<T> {
     const Vec3<T>& n_g = e.at.n_g;
     x.etendue = abs(dot(n_s, e.wi) * dot(n_g, e.wo) / (dot(n_s, e.wo) * dot(n_g, e.wi)));
     if (e.scattering == Scattering::Transmission) {
-      const double eta = std::get<Dielectric>(e.bsdf).eta;
+      const double eta = delta_eta(e.bsdf);
       const double beyond = value(dot(n_s, e.wi)) > 0.0 ? eta : 1.0 / eta;
       x.etendue = x.etendue / (beyond * beyond);
     }

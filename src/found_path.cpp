@@ -26,8 +26,8 @@ CameraPart camera_part(const Scene& scene, const FoundPath& found, PhaseSpace ph
     part.last = z.surface;
     PathVertex& vertex = topology.vertices[topology.scatter_count++];
     vertex.hit = z.surface.hit;
-    vertex.delta = z.delta;
     if (i + 1 == count && !scatter_last) break;
+    vertex.delta = z.delta;
     const Vec3d wo = direction_before(found, i + 1);
     vertex.scattering = z.surface.side(wo);
     if (!z.delta) part.path.coordinates(topology.block_count++) = wo;
@@ -44,9 +44,9 @@ LightPart light_part(const FoundPath& found) {
     vertex.p = y.surface.at.p;
     vertex.hit = y.surface.hit;
     vertex.bsdf = y.surface.bsdf;
-    vertex.delta = y.delta;
     light.last = y.surface;
     if (i + 1 == found.s - 1) break;
+    vertex.delta = y.delta;
     vertex.to_sensor = -found.from_light[i + 1].surface.wi;
     vertex.scattering = y.surface.side(vertex.to_sensor);
   }

@@ -27,7 +27,7 @@ class LightTracer {
                   RayFollower(scene_, emission.origin, emission.start, emission.direction),
                   max_depth_ - 1, rng, subpath_);
     for (int i = 0; i < subpath_.size(); ++i) {
-      if (subpath_[i].delta) continue;
+      if (!subpath_[i].connects) continue;
       if (const auto seen = connect_to_sensor(scene_, subpath_[i]))
         sink.splat(seen->film, seen->value);
     }

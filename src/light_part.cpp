@@ -33,7 +33,7 @@ std::optional<LightPart> sample_light_part(const Scene& scene, int surface_verti
     vertex.p = surface.at.p;
     vertex.hit = hit;
     vertex.bsdf = surface.bsdf;
-    vertex.delta = is_delta(*surface.bsdf);
+    vertex.delta = is_delta(*surface.bsdf);  // of the last, whose lobe is not drawn
     if (light.count == surface_vertices) {
       light.last = surface;
       return light;
@@ -41,6 +41,7 @@ std::optional<LightPart> sample_light_part(const Scene& scene, int surface_verti
     const auto next =
         driftlight::sample(*surface.bsdf, surface.surface(), surface.wi, rng.uniform3());
     if (!next || !passes(surface.at, surface.wi, next->wo)) return std::nullopt;
+    vertex.delta = next->delta;
     vertex.scattering = next->scattering;
     vertex.to_sensor = next->wo;
     follower.leave(surface, next->wo);

@@ -72,7 +72,7 @@ PathPoints points_of(const Scene& scene, const Sample& path) {
   int block = 1;
   for (std::size_t k = 0; k < topology.scatter_count; ++k) {
     const WalkVertex<double> x = arrive(scene, topology.vertices[k], ray);
-    result.add(x.at.p, lobe_of(x.bsdf));
+    result.add(x.at.p, lobe_of(x.bsdf, x.vertex.delta));
     if (k + 1 == topology.scatter_count) break;
     ray.origin = x.at.p;
     if (x.vertex.delta)

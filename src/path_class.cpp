@@ -23,6 +23,14 @@ struct BsdfKind {
     return "rough dielectric " + name(b.microfacets);
   }
   std::string operator()(const Phong&) const { return "phong"; }
+  std::string operator()(const Plastic&) const { return "plastic"; }
+  std::string operator()(const RoughPlastic& b) const {
+    return "rough plastic " + name(b.microfacets);
+  }
+  std::string operator()(const ThinDielectric&) const { return "thin dielectric"; }
+  std::string operator()(const Mask& b) const {
+    return b.nested == nullptr ? "null" : "masked " + kind_of(b.nested->bsdf);
+  }
 };
 
 /// The event of scattering at an interface: which side, and whether it is passed.
@@ -38,11 +46,23 @@ std::string lobe(const Phong& b, const ScatterEvent<double>& e) {
   return specular > diffuse ? " glossy lobe" : " diffuse lobe";
 }
 
+std::string lobe(const RoughPlastic& b, const ScatterEvent<double>& e) {
+  const Vec3d& n = e.at.n_s;
+  const auto part = detail::rough_plastic_parts(b, n.dot(e.wi), n.dot(e.wo), e.wi.dot(e.wo));
+  const double specular = luminance(b.specular_reflectance.eval(e.at.uv)) * part.specular;
+  const double diffuse = luminance(b.base.albedo(e.at.uv)) * part.diffuse;
+  return specular > diffuse ? " coat" : " base";
+}
+
 /// The BSDF with what it does at this event.
-std::string lobe(const ScatterEvent<double>& e) {
+std::string lobe(const ScatterEvent<double>& e, bool delta) {
   const std::string kind = kind_of(e.bsdf);
+  if (std::holds_alternative<Mask>(e.bsdf) && delta && e.scattering == Scattering::Transmission)
+    return kind + " passed";
+  if (std::holds_alternative<Plastic>(e.bsdf)) return kind + (delta ? " coat" : " base");
   if (is_transmissive(e.bsdf)) return kind + passage(e);
   if (const auto* phong = std::get_if<Phong>(&e.bsdf)) return kind + lobe(*phong, e);
+  if (const auto* plastic = std::get_if<RoughPlastic>(&e.bsdf)) return kind + lobe(*plastic, e);
   return kind;
 }
 
@@ -70,9 +90,9 @@ class Collector : public WalkVisitor<double> {
   void vertex(int k) { index_ = static_cast<std::size_t>(k); }
   void scatter(const ScatterEvent<double>& e) { add_event(e); }
   void connect(const ScatterEvent<double>& e) { add_event(e); }
-  void delta(const ScatterEvent<double>& e) { add_event(e); }
+  void delta(const ScatterEvent<double>& e) { add_event(e, true); }
   void light_scatter(const ScatterEvent<double>& e) { add_light_event(e); }
-  void light_delta(const ScatterEvent<double>& e) { add_light_event(e); }
+  void light_delta(const ScatterEvent<double>& e) { add_light_event(e, true); }
   void light_connect(const ScatterEvent<double>& e) {
     classes_.insert(index_ == 0 ? "joined to the sensor" : "joined between surfaces");
     add_light_event(e);
@@ -101,8 +121,8 @@ class Collector : public WalkVisitor<double> {
   void directional_connection(const DirectionalEmitter&) { delta_end("directional"); }
 
  private:
-  void add_event(const ScatterEvent<double>& e) {
-    last_lobe_ = lobe(e);
+  void add_event(const ScatterEvent<double>& e, bool delta = false) {
+    last_lobe_ = lobe(e, delta);
     const std::string on = " on " + surface(e.shape);
     events_.at(index_) = last_lobe_ + on;
     ++count_;
@@ -114,8 +134,8 @@ class Collector : public WalkVisitor<double> {
     const Material& material = scene_.materials()[e.shape.material];
     if (material.back && &e.bsdf == &scene_.bsdfs()[*material.back]) classes_.insert("on back");
   }
-  void add_light_event(const ScatterEvent<double>& e) {
-    add_event(e);
+  void add_light_event(const ScatterEvent<double>& e, bool delta = false) {
+    add_event(e, delta);
     events_.at(index_) += " by light";
     classes_.insert(last_lobe_ + " by light");
   }

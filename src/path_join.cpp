@@ -42,7 +42,7 @@ std::optional<Sample> connect_to_emitter(const Scene& scene, CameraPart& part,
   const auto* area = std::get_if<AreaEmitter>(&emitter);
   if (area == nullptr) {
     topology.end = PathEnd::PointConnection;
-  } else if (connects_to_area(*surface.bsdf, scene.shapes()[area->shape])) {
+  } else if (connects_to_area(lobe_of(*surface.bsdf, false), scene.shapes()[area->shape])) {
     topology.end = PathEnd::AreaConnection;
     path.coordinates(topology.block_count++) = y.p;
   } else {
@@ -96,7 +96,8 @@ bool set_end(const Scene& scene, const LightPart& light, Sample& path) {
     if (light.count == 0 || light[0].delta) return false;
     --topology.block_count;
   } else if (area != nullptr && light.count > 0 &&
-             connects_to_area(*light[0].bsdf, scene.shapes()[area->shape])) {
+             connects_to_area(lobe_of(*light[0].bsdf, light[0].delta),
+                              scene.shapes()[area->shape])) {
     topology.end = PathEnd::AreaConnection;
     path.coordinates(topology.block_count - 1) = light.point.p;
   }
@@ -118,7 +119,8 @@ std::optional<Sample> join_in_light_chart(const Scene& scene, CameraPart& part,
   }
   if (!append(light, edge, part.path)) return std::nullopt;
   topology.emitter = light.emitter;
-  for (int i = light.count - 1; i >= 0; --i) points.add(light[i].p, lobe_of(*light[i].bsdf));
+  for (int i = light.count - 1; i >= 0; --i)
+    points.add(light[i].p, lobe_of(*light[i].bsdf, light[i].delta));
   return with_light_side(scene, part.path, points, light.point.p, light_count);
 }
 
@@ -127,7 +129,8 @@ std::optional<int> light_side_of(const Scene& scene, const CameraPart& part, con
                                  const PathPoints& camera) {
   std::array<Lobe, kMaxPathLength> lobes = camera.lobes;
   std::size_t count = camera.count;
-  for (int i = light.count - 1; i >= 0; --i) lobes[count++] = lobe_of(*light[i].bsdf);
+  for (int i = light.count - 1; i >= 0; --i)
+    lobes[count++] = lobe_of(*light[i].bsdf, light[i].delta);
   return light_side(part.path.topology.phase_space, scene, {lobes.data(), count}, light.emitter);
 }
 
@@ -199,7 +202,7 @@ std::optional<PathSampler::Sample> end_by_hit(const Scene& scene, CameraPart& pa
                                   *shape.emitter);
     if (count.value() > 0) return with_light_side(scene, path, points, at.p, *count);
   }
-  if (part.last && connects_to_area(*part.last->bsdf, shape)) {
+  if (part.last && connects_to_area(part.last_lobe(), shape)) {
     topology.end = PathEnd::AreaConnection;
     path.coordinates(topology.block_count - 1) = at.p;
   } else {
@@ -215,7 +218,7 @@ std::optional<PathSampler::Sample> end_by_blurred_hit(const Scene& scene, Camera
   PathTopology& topology = part.path.topology;
   const auto& lamp = std::get<BlurredAreaEmitter>(scene.emitters()[emitter]);
   const Shape& shape = scene.shapes()[lamp.sharp().shape];
-  if (part.last && connects_to_area(*part.last->bsdf, shape)) return std::nullopt;
+  if (part.last && connects_to_area(part.last_lobe(), shape)) return std::nullopt;
   if (topology.phase_space == PhaseSpace::Bidirectional) {
     const PathPoints points = points_of(scene, part.path);
     const auto count =

@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "driftlight/chart_rule.h"
 #include "driftlight/path_sampler.h"
 #include "light_part.h"
 #include "ray_follower.h"
@@ -16,6 +17,11 @@ struct CameraPart {
   PathSampler::Sample path;
   RayFollower follower;            ///< the ray that leaves its last vertex, if that has scattered
   std::optional<SurfaceHit> last;  ///< the last vertex; none: the sensor
+
+  /// Of the last vertex.
+  Lobe last_lobe() const {
+    return lobe_of(*last->bsdf, path.topology.vertices[path.topology.scatter_count - 1U].delta);
+  }
 };
 
 /// Each uses up the camera part, and returns none if the path carries no light for certain.

@@ -28,11 +28,12 @@ std::optional<CameraPart> sample_camera_part(const Scene& scene, PhaseSpace phas
     part.last = surface;
     PathVertex& vertex = topology.vertices[topology.scatter_count++];
     vertex.hit = hit;
-    vertex.delta = is_delta(*surface.bsdf);
+    vertex.delta = is_delta(*surface.bsdf);  // of the last, whose lobe may not be drawn
     if (k == surface_vertices && !scatter_last) return part;
     const auto next =
         driftlight::sample(*surface.bsdf, surface.surface(), surface.wi, rng.uniform3());
     if (!next || !passes(surface.at, surface.wi, next->wo)) return std::nullopt;
+    vertex.delta = next->delta;
     vertex.scattering = next->scattering;
     if (!vertex.delta) part.path.coordinates(topology.block_count++) = next->wo;
     part.follower.leave(surface, next->wo);

@@ -28,8 +28,7 @@ class Estimator {
       const SurfaceHit surface = follower.surface(hit);
       result += throughput * emission(surface, last);
       if (depth == max_depth_ || surface.bsdf == nullptr) return result;
-      const bool delta = is_delta(*surface.bsdf);
-      if (!delta) result += throughput * direct_light(surface, rng);
+      if (!is_delta(*surface.bsdf)) result += throughput * direct_light(surface, rng);
 
       const auto next = sample(*surface.bsdf, surface.surface(), surface.wi, rng.uniform3());
       if (!next || !passes(surface.at, surface.wi, next->wo)) return result;
@@ -62,7 +61,7 @@ class Estimator {
   /// f |cos| / pdf of a BSDF sample.
   static Rgbd weight(const SurfaceHit& at, const BsdfSample& next, LastBounce& last) {
     const Bsdf& bsdf = *at.bsdf;
-    last.delta = is_delta(bsdf);
+    last.delta = next.delta;
     if (last.delta) {
       last.pdf = delta_probability(bsdf, at.surface(), at.wi, next.scattering);
       return color_of(eval_delta(bsdf, at.surface(), at.wi, next.scattering)) / last.pdf;

@@ -16,8 +16,12 @@ bool has_points(const Shape& emitter) {
   return emitter.extent.planar || std::holds_alternative<Sphere>(emitter.geometry);
 }
 
-bool connects_to_area(const Bsdf& last, const Shape& emitter) {
-  return is_diffuse(last) && has_points(emitter);
+bool connects_to_area(Lobe last, const Shape& emitter) {
+  return last == Lobe::Wide && has_points(emitter);
+}
+
+bool has_lobe(const Bsdf& bsdf, const PathVertex& vertex) {
+  return vertex.delta ? has_delta(bsdf, vertex.scattering) : !is_delta(bsdf);
 }
 
 bool passes(const Interaction<double>& at, const Vec3d& wi, const Vec3d& wo) {
@@ -73,18 +77,16 @@ class Tracer {
     if (!hit.valid()) return TraceStatus::Missed;
     const SurfaceHit surface = follower_.surface(hit);
     if (surface.bsdf == nullptr) return TraceStatus::Missed;
-    if (is_delta(*surface.bsdf) != wanted.delta) return TraceStatus::OtherLobe;
+    if (!has_lobe(*surface.bsdf, wanted)) return TraceStatus::OtherLobe;
     result_.vertices[index] = wanted;
     result_.vertices[index].hit = hit;
-    bsdf_ = surface.bsdf;
-    lobes_[index] = lobe_of(*surface.bsdf);
+    lobes_[index] = lobe_of(*surface.bsdf, wanted.delta);
+    last_ = lobes_[index];
     if (pattern_.ends_in_connection() && k + 1 == pattern_.scatter_count)
       return connect(surface, wanted);
 
     Vec3d wo;
     if (wanted.delta) {
-      if (wanted.scattering == Scattering::Transmission && !is_transmissive(*surface.bsdf))
-        return TraceStatus::OtherLobe;
       wo = delta_direction(*surface.bsdf, surface.surface(), surface.wi, wanted.scattering);
       if (!wo.allFinite()) return TraceStatus::OtherLobe;  // total reflection
     } else {
@@ -102,7 +104,7 @@ class Tracer {
     EmitterPoint y;
     if (const auto* light = std::get_if<AreaEmitter>(&emitter)) {
       const Shape& shape = scene_.shapes()[light->shape];
-      if (!connects_to_area(*surface.bsdf, shape)) return TraceStatus::OtherLobe;
+      if (!connects_to_area(last_, shape)) return TraceStatus::OtherLobe;
       y.p = coordinates_(next_block_);
       y.n = emitter_normal(shape, y.p);
     } else {
@@ -129,7 +131,7 @@ class Tracer {
     if (!hit.valid()) return TraceStatus::Missed;
     const Shape& shape = scene_.shapes()[hit.shape];
     if (!shape.emitter) return TraceStatus::Missed;
-    if (bsdf_ != nullptr && connects_to_area(*bsdf_, shape)) return TraceStatus::OtherLobe;
+    if (connects_to_area(last_, shape)) return TraceStatus::OtherLobe;
     result_.vertices[result_.scatter_count].hit = hit;
     result_.emitter = *shape.emitter;
     return TraceStatus::Ok;
@@ -137,7 +139,7 @@ class Tracer {
 
   TraceStatus see(const BlurredAreaEmitter& lamp) {
     const Shape& shape = scene_.shapes()[lamp.sharp().shape];
-    if (bsdf_ != nullptr && connects_to_area(*bsdf_, shape)) return TraceStatus::OtherLobe;
+    if (connects_to_area(last_, shape)) return TraceStatus::OtherLobe;
     if (!lamp.shines(follower_.ray())) return TraceStatus::Missed;
     return is_clear(lamp, follower_) ? TraceStatus::Ok : TraceStatus::Occluded;
   }
@@ -148,7 +150,7 @@ class Tracer {
   PathTopology& result_;
   RayFollower follower_;
   int next_block_ = 1;
-  const Bsdf* bsdf_ = nullptr;  ///< of the last scattering vertex so far
+  Lobe last_ = Lobe::Delta;  ///< of the last scattering vertex so far; a sensor connects to nothing
   std::array<Lobe, kMaxPathLength> lobes_;
 };
 

@@ -50,6 +50,19 @@ struct Brightness {
   double operator()(const Phong& b) const {
     return std::max(b.diffuse_reflectance.maximum(), b.specular_reflectance.maximum());
   }
+  double operator()(const Plastic& b) const { return coated(b); }
+  double operator()(const RoughPlastic& b) const { return coated(b); }
+  double operator()(const ThinDielectric& b) const { return largest(b); }
+  /// It is dark only if it is opaque and what it masks is.
+  double operator()(const Mask& b) const {
+    const double nested = b.nested == nullptr ? 0.0 : std::visit(*this, b.nested->bsdf);
+    const bool opaque = b.opacity.is_constant() && (b.opacity.color >= 1.0).all();
+    return opaque ? nested : 1.0;
+  }
+  template <class B>
+  static double coated(const B& b) {
+    return std::max(b.base.reflectance.maximum(), b.specular_reflectance.maximum());
+  }
   template <class B>
   static double largest(const B& b) {
     return std::max(b.specular_reflectance.maximum(), b.specular_transmittance.maximum());

@@ -24,9 +24,9 @@ Event event(const SurfaceHit& x, const Vec3d& wi, const Vec3d& wo) {
           pdf(*x.bsdf, x.surface(), wo, wi)};
 }
 
-/// (n_o / n_i)^2 of smooth glass.
+/// (n_o / n_i)^2 of a delta transmission.
 double squared_index_ratio(const Bsdf& bsdf, double cos_i) {
-  const double eta = std::get<Dielectric>(bsdf).eta;
+  const double eta = delta_eta(bsdf);
   return cos_i > 0.0 ? eta * eta : 1.0 / (eta * eta);
 }
 
@@ -85,7 +85,7 @@ SubpathVertex SubpathTracer::arrive(const Departure& from, const SurfaceHit& sur
   x.previous_connects = from.connects;
   x.throughput = from.throughput;
   x.roulette = from.roulette;
-  x.delta = surface.bsdf != nullptr && is_delta(*surface.bsdf);
+  x.connects = surface.bsdf != nullptr && !is_delta(*surface.bsdf);
   return x;
 }
 
@@ -105,7 +105,7 @@ Departure SubpathTracer::depart(Walk walk, const SubpathVertex& x, const BsdfSam
   const bool from_sensor = walk == Walk::FromSensor;
   const Vec3d& wi = from_sensor ? at.wi : next.wo;
   const Vec3d& wo = from_sensor ? next.wo : at.wi;
-  const Event e = x.delta ? delta_event(at, wi, wo, next.scattering) : event(at, wi, wo);
+  const Event e = next.delta ? delta_event(at, wi, wo, next.scattering) : event(at, wi, wo);
   const double forward = from_sensor ? e.toward_light : e.toward_sensor;
   const double backward = from_sensor ? e.toward_sensor : e.toward_light;
   Departure from;
@@ -117,9 +117,9 @@ Departure SubpathTracer::depart(Walk walk, const SubpathVertex& x, const BsdfSam
   if (!from_sensor) factor *= from.cosine / std::abs(at.at.n_g.dot(at.wi));
   from.throughput = x.throughput * e.f * factor;
   from.roulette = x.roulette;
-  const double connection = x.previous_connects && !x.delta ? 1.0 : 0.0;
+  const double connection = x.previous_connects && !next.delta ? 1.0 : 0.0;
   from.others = (power_(backward) * x.others + connection) / power_(x.density);
-  from.connects = !x.delta;
+  from.connects = !next.delta;
   return from;
 }
 
@@ -135,10 +135,11 @@ std::optional<Departure> SubpathTracer::trace(Walk walk, const Departure& start,
     if (!hit.valid()) return from;
     const SurfaceHit surface = follower.surface(hit);
     if (surface.bsdf == nullptr) return std::nullopt;
-    const SubpathVertex& x = subpath.add(arrive(from, surface));
+    SubpathVertex& x = subpath.add(arrive(from, surface));
     if (subpath.size() == max_size) return std::nullopt;
     const auto next = sample(*surface.bsdf, surface.surface(), surface.wi, rng.uniform3());
     if (!next || !passes(surface.at, surface.wi, next->wo)) return std::nullopt;
+    x.delta = next->delta;
     from = depart(walk, x, *next);
     if ((from.throughput == 0.0).all()) return std::nullopt;
     if (roulette_ == Roulette::On && subpath.size() >= kRouletteDepth) {

@@ -40,7 +40,7 @@ enum class Walk : std::uint8_t { FromSensor, FromLight };
 struct Arrival {
   double density = 0;              ///< p_k per area; at infinity per solid angle
   double others = 0;               ///< see above
-  bool previous_connects = false;  ///< x_(k-1) is not a delta vertex
+  bool previous_connects = false;  ///< x_(k-1) has not scattered by a delta lobe
 };
 
 /// A surface vertex. `surface.wi` points to the previous vertex of the same subpath.
@@ -49,8 +49,9 @@ struct SubpathVertex : Arrival {
   /// What multiplies the factors of the path from here on: of a subpath from the sensor radiance,
   /// of one from the light power.
   Rgbd throughput{0, 0, 0};
-  double roulette = 1;  ///< factor of the throughput that makes up for roulette
-  bool delta = false;
+  double roulette = 1;    ///< factor of the throughput that makes up for roulette
+  bool connects = false;  ///< not all lobes are delta ones
+  bool delta = false;     ///< the lobe by which the subpath has left
 };
 
 /// A subpath on its way between two vertices.
@@ -124,8 +125,7 @@ class SubpathTracer {
   Roulette roulette_;
 };
 
-/// f_s |n_s . wo| with wi toward the sensor and wo toward the light, as a colour; of BSDFs that are
-/// not delta.
+/// f_s |n_s . wo| with wi toward the sensor and wo toward the light, as a colour; of densities.
 Rgbd scattered(const SurfaceHit& x, const Vec3d& wi, const Vec3d& wo);
 
 }  // namespace driftlight

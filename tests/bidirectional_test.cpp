@@ -93,15 +93,16 @@ struct Vertices : WalkVisitor<double> {
   std::size_t index = 0;
 
   void vertex(int k) { index = static_cast<std::size_t>(k); }
-  void scatter(const ScatterEvent<double>& e) {
+  void add(const ScatterEvent<double>& e, bool is_delta) {
     points.at(index) = e.at.p;
-    lobes.at(index) = lobe_of(e.bsdf);
+    lobes.at(index) = lobe_of(e.bsdf, is_delta);
   }
+  void scatter(const ScatterEvent<double>& e) { add(e, false); }
   void connect(const ScatterEvent<double>& e) { scatter(e); }
-  void delta(const ScatterEvent<double>& e) { scatter(e); }
+  void delta(const ScatterEvent<double>& e) { add(e, true); }
   void light_scatter(const ScatterEvent<double>& e) { scatter(e); }
   void light_connect(const ScatterEvent<double>& e) { scatter(e); }
-  void light_delta(const ScatterEvent<double>& e) { scatter(e); }
+  void light_delta(const ScatterEvent<double>& e) { add(e, true); }
 };
 
 Vertices vertices_of(const TestScene& test, const PathTopology& topology,

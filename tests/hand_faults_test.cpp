@@ -154,11 +154,31 @@ std::vector<Fault> scatter_faults() {
                     [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
                       if (is<Phong>(b)) f.v[1] *= -1.0;
                     }),
+      scatter_fault("plastic: sign of the slope of T by cos_i",
+                    [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
+                      if (is<Plastic>(b)) f.cos_i[3] *= -1.0;
+                    }),
+      scatter_fault("plastic: one per mil of a texture under the coat",
+                    [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
+                      if (is<Plastic>(b)) f.u[0] *= 1.001;
+                    }),
+      scatter_fault("rough plastic: sign by wi.wo",
+                    [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
+                      if (is<RoughPlastic>(b)) f.io[1] *= -1.0;
+                    }),
+      scatter_fault("rough plastic: factor by cos_o",
+                    [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
+                      if (is<RoughPlastic>(b)) f.cos_o[0] *= 1.01;
+                    }),
+      scatter_fault("mask: slope of the opacity",
+                    [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
+                      if (is<Mask>(b)) f.v[2] *= 1.01;
+                    }),
   };
 }
 
 std::vector<Fault> delta_faults() {
-  std::vector<Fault> faults(7);
+  std::vector<Fault> faults(10);
   faults[0].name = "mirror: sign of the Fresnel slope of red";
   faults[0].delta = [](const Bsdf& b, Scattering, FactorPartials& f) {
     if (is<Conductor>(b)) f.cos_i[0] *= -1.0;
@@ -186,6 +206,18 @@ std::vector<Fault> delta_faults() {
   faults[6].name = "refracted direction: factor of dwi";
   faults[6].delta_map = [](Scattering s, HandRules::DeltaMap& map) {
     if (s == Scattering::Transmission) map.wi_factor *= 0.99;
+  };
+  faults[7].name = "plastic coat: sign by cos_i";
+  faults[7].delta = [](const Bsdf& b, Scattering, FactorPartials& f) {
+    if (is<Plastic>(b)) f.cos_i[3] *= -1.0;
+  };
+  faults[8].name = "pane: factor of transmission by cos_i";
+  faults[8].delta = [](const Bsdf& b, Scattering s, FactorPartials& f) {
+    if (is<ThinDielectric>(b) && s == Scattering::Transmission) f.cos_i[3] *= 1.01;
+  };
+  faults[9].name = "mask: sign of what passes by u";
+  faults[9].delta = [](const Bsdf& b, Scattering s, FactorPartials& f) {
+    if (is<Mask>(b) && s == Scattering::Transmission) f.u[0] *= -1.0;
   };
   return faults;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "driftlight/render.h"
+#include "support/test_scenes.h"
 #include "support/tiles.h"
 
 namespace driftlight {
@@ -36,6 +37,7 @@ const std::map<std::string, Work>& works() {
       {"door_ajar", {200, 150, 200000, 0.12}},
       {"ring_caustic", {300, 200, 200000, 0.04}},
       {"limelight", {256, 200, 100000, 0.02}},
+      {"coated", {256, 200, 200000, 0.05}},
       {"sun_pane", {600, 200, 100000, 0.05}},
       {"lamp_in_glass", {1500, 200, 200000, 0.12}}};
   return kWorks;
@@ -97,6 +99,7 @@ LoadedScene sun_pane_in_haze() {
 /// hits would make means that are not normal.
 LoadedScene load_scene_of(const std::string& name) {
   if (name == "limelight") return {test::limelight(), 5, {}};
+  if (name == "coated") return {test::coated(false), 5, {}};
   if (name == "sun_pane") return sun_pane_in_haze();
   if (name == "lamp_in_glass") return load_small(name, {{"filament", "0.1"}});
   if (name == "ring_caustic") return load_small(name, {{"alpha", "0.2"}});
@@ -167,7 +170,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"limelight", "from_sensor"}, Case{"limelight", "chains_alone"},
                     Case{"limelight", "redistribution_both_ends"}, Case{"sun_pane", "splitting"},
                     Case{"sun_pane", "high_threshold"}, Case{"glass_caustic", "splitting"},
-                    Case{"lamp_in_glass", "two_levels"}),
+                    Case{"lamp_in_glass", "two_levels"}, Case{"coated", "gradient"},
+                    Case{"coated", "redistribution_both_ends"}),
     name_of);
 
 /// All of them, but for an island of glass_caustic, the lamp's reflection, that one strategy alone

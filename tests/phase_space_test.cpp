@@ -10,6 +10,7 @@
 #include <cmath>
 #include <string>
 
+#include "driftlight/chart_rule.h"
 #include "driftlight/contribution.h"
 #include "driftlight/gradient.h"
 #include "driftlight/kernel.h"
@@ -297,10 +298,13 @@ TEST(ConnectsToArea, DependsOnLobeAndShapeOnly) {
       const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry);
       const bool charted = mesh != nullptr ? mesh->triangles.size() == 2
                                            : !std::holds_alternative<Cylinder>(shape.geometry);
-      EXPECT_EQ(connects_to_area(Diffuse{}, shape), charted);
-      EXPECT_FALSE(connects_to_area(Phong{}, shape));
-      EXPECT_FALSE(connects_to_area(RoughConductor{}, shape));
-      EXPECT_FALSE(connects_to_area(RoughDielectric{}, shape));
+      EXPECT_EQ(connects_to_area(lobe_of(Diffuse{}, false), shape), charted);
+      for (const Bsdf& bsdf : {Bsdf(Phong{}), Bsdf(RoughConductor{}), Bsdf(RoughDielectric{})})
+        EXPECT_FALSE(connects_to_area(lobe_of(bsdf, false), shape));
+      // Plastic has a diffuse lobe and a delta one.
+      const Bsdf plastic = Plastic(1.5, Texture{}, Texture{}, false);
+      EXPECT_EQ(connects_to_area(lobe_of(plastic, false), shape), charted);
+      EXPECT_FALSE(connects_to_area(lobe_of(plastic, true), shape));
     }
   }
 }

@@ -109,6 +109,54 @@ TEST(BsdfsXml, ReadsPhong) {
   expect_near(kept.specular_reflectance.color, Rgbd(0.6, 0.2, 0.3));
 }
 
+TEST(BsdfsXml, ReadsPlastics) {
+  const auto plastic = std::get<Plastic>(load_bsdf(R"(<bsdf type="plastic"/>)"));
+  EXPECT_NEAR(plastic.eta, 1.49 / kAir, 1e-12);
+  EXPECT_FALSE(plastic.base.nonlinear);
+  expect_near(plastic.base.reflectance.color, Rgbd(0.5, 0.5, 0.5));
+  expect_near(plastic.specular_reflectance.color, Rgbd(1, 1, 1));
+  const auto rough = std::get<RoughPlastic>(load_bsdf(
+      R"(<bsdf type="roughplastic"><float name="alpha" value="0.2"/>
+         <string name="distribution" value="ggx"/><float name="intIOR" value="1.9"/>
+         <boolean name="nonlinear" value="true"/>
+         <rgb name="diffuseReflectance" value="0.1, 0.2, 0.3"/></bsdf>)"));
+  EXPECT_EQ(rough.microfacets.alpha, 0.2);
+  EXPECT_EQ(rough.microfacets.distribution, Distribution::Ggx);
+  EXPECT_NEAR(rough.eta, 1.9 / kAir, 1e-12);
+  EXPECT_TRUE(rough.base.nonlinear);
+  expect_near(rough.base.reflectance.color, Rgbd(0.1, 0.2, 0.3));
+}
+
+TEST(BsdfsXml, ReadsPanesAndWhatOnlyLetsPass) {
+  const auto pane = std::get<ThinDielectric>(
+      load_bsdf(R"(<bsdf type="thindielectric"><float name="intIOR" value="1.5"/></bsdf>)"));
+  EXPECT_NEAR(pane.eta, 1.5 / kAir, 1e-12);
+  const auto nothing = std::get<Mask>(load_bsdf(R"(<bsdf type="null"/>)"));
+  expect_near(nothing.opacity.color, Rgbd(0, 0, 0));
+  EXPECT_EQ(nothing.nested, nullptr);
+}
+
+TEST(BsdfsXml, MasksEachSide) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(lit(
+      R"(<shape type="sphere"><bsdf type="mask"><bsdf type="diffuse"/></bsdf></shape>
+         <shape type="sphere"><bsdf type="mask"><rgb name="opacity" value="0.2"/>
+           <bsdf type="twosided"><bsdf type="phong"/></bsdf></bsdf></shape>
+         <shape type="sphere"><bsdf type="mask"><bsdf type="thindielectric"/></bsdf></shape>)"));
+  const auto& bsdfs = loaded.scene.bsdfs();
+  const auto material = [&](std::size_t shape) {
+    return loaded.scene.materials()[loaded.scene.shapes()[shape].material];
+  };
+  const auto& front = std::get<Mask>(bsdfs[material(0).front]);
+  expect_near(front.opacity.color, Rgbd(0.5, 0.5, 0.5));
+  EXPECT_TRUE(std::holds_alternative<Diffuse>(front.nested->bsdf));
+  EXPECT_EQ(std::get<Mask>(bsdfs[*material(0).back]).nested, nullptr);
+  const auto& back = std::get<Mask>(bsdfs[*material(1).back]);
+  expect_near(back.opacity.color, Rgbd(0.2, 0.2, 0.2));
+  EXPECT_TRUE(std::holds_alternative<Phong>(back.nested->bsdf));
+  EXPECT_FALSE(material(2).back.has_value());
+}
+
 TEST(BsdfsXml, ScalesReflectanceAboveOneAndSaysSo) {
   const SceneDirectory directory;
   const LoadedScene loaded = directory.load(lit(

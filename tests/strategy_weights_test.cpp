@@ -22,11 +22,12 @@ struct GivenPath {
   std::vector<SurfaceHit> scattering;  ///< x_1 .. x_(n-1), wi toward the sensor
   std::vector<Vec3d> v;                ///< v_0 .. v_(n-1)
   LightEnd end;
+  std::vector<bool> by_delta;  ///< whether x_1, .. scatter by a delta lobe
 
   int length() const { return static_cast<int>(v.size()); }
   const SurfaceHit& x(int k) const { return scattering[static_cast<std::size_t>(k - 1)]; }
   const Vec3d& direction(int k) const { return v[static_cast<std::size_t>(k)]; }
-  bool delta(int k) const { return is_delta(*x(k).bsdf); }
+  bool delta(int k) const { return by_delta[static_cast<std::size_t>(k - 1)]; }
   bool infinite() const { return end.at_infinity(); }
   double inverse_r2(const Scene& scene, int k) const {  // of edge k
     if (k + 1 == length() && infinite()) return 1.0;
@@ -57,7 +58,10 @@ std::optional<GivenPath> draw_path(const TestScene& test, Rng& rng) {
   GivenPath path;
   const int last = static_cast<int>(rng.uniform() * (subpath.size() + 1));
   if (last < subpath.size()) {
-    for (int i = 0; i <= last; ++i) path.scattering.push_back(subpath[i].surface);
+    for (int i = 0; i <= last; ++i) {
+      path.scattering.push_back(subpath[i].surface);
+      path.by_delta.push_back(i < last && subpath[i].delta);
+    }
     if (const auto end = light_end_at(scene, path.scattering.back())) {
       path.v.emplace_back(-path.scattering.back().wi);
       path.scattering.pop_back();
@@ -75,7 +79,10 @@ std::optional<GivenPath> draw_path(const TestScene& test, Rng& rng) {
   } else {
     const auto end = light_end_toward(scene, escape ? escape->direction : v);
     if (!escape || !end) return std::nullopt;
-    for (int i = 0; i < subpath.size(); ++i) path.scattering.push_back(subpath[i].surface);
+    for (int i = 0; i < subpath.size(); ++i) {
+      path.scattering.push_back(subpath[i].surface);
+      path.by_delta.push_back(subpath[i].delta);
+    }
     path.v.push_back(escape->direction);
     path.end = *end;
   }
@@ -92,8 +99,9 @@ std::vector<Departure> walk_from_sensor(const SubpathTracer& tracer, const Given
   std::vector<Departure> departures{tracer.leave_sensor(path.direction(0))};
   for (int k = 1; k < path.length(); ++k) {
     vertices.push_back(tracer.arrive(departures.back(), path.x(k)));
-    departures.push_back(tracer.depart(Walk::FromSensor, vertices.back(),
-                                       {path.direction(k), path.x(k).side(path.direction(k))}));
+    departures.push_back(
+        tracer.depart(Walk::FromSensor, vertices.back(),
+                      {path.direction(k), path.x(k).side(path.direction(k)), path.delta(k)}));
   }
   return departures;
 }
@@ -109,7 +117,7 @@ std::vector<SubpathVertex> walk_from_light(const SubpathTracer& tracer, const Gi
     surface.wi = path.direction(k);
     vertices.push_back(tracer.arrive(from, surface));
     const Vec3d& wi = path.x(k).wi;
-    from = tracer.depart(Walk::FromLight, vertices.back(), {wi, surface.side(wi)});
+    from = tracer.depart(Walk::FromLight, vertices.back(), {wi, surface.side(wi), path.delta(k)});
   }
   return vertices;
 }

@@ -7,11 +7,13 @@
 /// need.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <variant>
 
 #include "driftlight/fresnel.h"
 #include "driftlight/microfacet.h"
+#include "driftlight/rough_transmittance.h"
 #include "driftlight/texture.h"
 
 namespace driftlight {
@@ -59,16 +61,91 @@ struct Phong {
   double exponent = 30;
 };
 
-using Bsdf = std::variant<Diffuse, Conductor, RoughConductor, Dielectric, RoughDielectric, Phong>;
+/// A diffuse base under a dielectric coat. Light that enters is reflected to and fro between base
+/// and coat until it leaves, T_i and T_o the transmittances of the coat on the way in and out:
+///   f = T_i T_o / (pi eta^2)  rho / (1 - rho r),
+/// r the reflectance of the coat from within for diffuse light; without `nonlinear` rho / (1 - r),
+/// as if only white light was reflected again.
+struct DiffuseBase {
+  Texture reflectance{Rgbd{0.5, 0.5, 0.5}};
+  bool nonlinear = false;
+  double internal_reflectance = 0;
+  double inverse_eta2 = 1;
+
+  /// rho / (1 - rho r)
+  template <Scalar T>
+  Rgb<T> albedo(const Vec2<T>& uv) const {
+    Rgb<T> rho = reflectance.eval(uv);
+    for (int c = 0; c < 3; ++c) {
+      if (nonlinear)
+        rho[c] = rho[c] / (1.0 - internal_reflectance * rho[c]);
+      else
+        rho[c] = rho[c] * (1.0 / (1.0 - internal_reflectance));
+    }
+    return rho;
+  }
+};
+
+/// Diffuse base under a smooth coat: a delta lobe of weight F, and T = 1 - F.
+struct Plastic {
+  double eta = 1.49 / 1.000277;
+  Texture specular_reflectance{Rgbd{1, 1, 1}};
+  DiffuseBase base;
+
+  Plastic(double eta, const Texture& diffuse, const Texture& specular, bool nonlinear);
+};
+
+/// Diffuse base under a rough coat, F D G / (4 cos_i cos_o) and T of RoughTransmittance.
+struct RoughPlastic {
+  Microfacets microfacets;
+  double eta = 1.49 / 1.000277;
+  Texture specular_reflectance{Rgbd{1, 1, 1}};
+  DiffuseBase base;
+  RoughTransmittance transmittance;
+
+  RoughPlastic(const Microfacets& microfacets, double eta, const Texture& diffuse,
+               const Texture& specular, bool nonlinear);
+};
+
+/// A thin pane, with all reflections between its two sides: R' = R + T^2 R / (1 - R^2) =
+/// 2 R / (1 + R); what passes goes straight on.
+struct ThinDielectric {
+  double eta = 1.5046 / 1.000277;
+  Texture specular_reflectance{Rgbd{1, 1, 1}};
+  Texture specular_transmittance{Rgbd{1, 1, 1}};
+};
+
+struct BsdfBox;
+
+/// The share `opacity` of another BSDF; the rest of the light goes straight on. Nothing nested: a
+/// surface that only lets pass. Where the nested BSDF transmits into a direction it is straight.
+struct Mask {
+  Texture opacity{Rgbd{0.5, 0.5, 0.5}};
+  std::shared_ptr<const BsdfBox> nested;
+};
+
+/// A BSDF is a density (Diffuse, rough ones, Phong), one or two delta lobes (Conductor, Dielectric,
+/// ThinDielectric), or both (Plastic, Mask): then a path says at each vertex by which it goes on.
+/// There is at most one delta lobe of each kind of scattering.
+using Bsdf = std::variant<Diffuse, Conductor, RoughConductor, Dielectric, RoughDielectric, Phong,
+                          Plastic, RoughPlastic, ThinDielectric, Mask>;
+
+struct BsdfBox {
+  Bsdf bsdf;
+};
 
 enum class Scattering : unsigned char { Reflection, Transmission };
 
-/// True for smooth mirrors and smooth glass, whose next direction is determined.
+/// True if it has no density: all its next directions are determined.
 bool is_delta(const Bsdf& bsdf);
-/// True if the BSDF scatters through the surface (and so serves both of its sides).
+/// True if it has a delta lobe of this kind.
+bool has_delta(const Bsdf& bsdf, Scattering scattering);
+/// True if one BSDF serves both sides of the surface: it scatters through, or lets pass alone.
 bool is_transmissive(const Bsdf& bsdf);
-/// True if every lobe is diffuse.
+/// True if it has a density, all of whose lobes are diffuse.
 bool is_diffuse(const Bsdf& bsdf);
+/// Index behind n over that before it, for its delta transmission; 1: straight on.
+double delta_eta(const Bsdf& bsdf);
 
 /// A non-negative colour exp(log_scale) * color: the factor with the large range as a logarithm.
 /// color = 0 means no contribution.
@@ -87,13 +164,13 @@ struct SurfacePoint {
   Vec2<T> uv;
 };
 
-/// f_s(wi, wo) |n . wo| of a BSDF that is not delta; zero for delta ones.
+/// f_s(wi, wo) |n . wo| of the BSDF's density, without its delta lobes.
 /// Radiance is transported: transmission carries the factor (eta_i / eta_t)^2.
 template <Scalar T>
 ScaledColor<T> eval(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi,
                     const Vec3<T>& wo);
 
-/// Direction that a delta BSDF sends wi into; non-finite for transmission under total reflection.
+/// Direction that a delta lobe sends wi into; non-finite for transmission under total reflection.
 template <Scalar T>
 Vec3<T> delta_direction(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi,
                         Scattering scattering);
@@ -106,16 +183,17 @@ ScaledColor<T> eval_delta(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec
 struct BsdfSample {
   Vec3d wo;
   Scattering scattering;
+  bool delta = false;  ///< by a delta lobe
 };
 
 /// Draws wo from three numbers in [0, 1). None where the BSDF sends nothing.
 std::optional<BsdfSample> sample(const Bsdf& bsdf, const SurfacePoint<double>& at, const Vec3d& wi,
                                  const Vec3d& u);
 
-/// Density per solid angle of `sample` (not for delta BSDFs).
+/// Density per solid angle of `sample` where it takes no delta lobe.
 double pdf(const Bsdf& bsdf, const SurfacePoint<double>& at, const Vec3d& wi, const Vec3d& wo);
 
-/// Probability with which `sample` of a delta BSDF takes this kind of scattering.
+/// Probability with which `sample` takes the delta lobe of this kind of scattering.
 double delta_probability(const Bsdf& bsdf, const SurfacePoint<double>& at, const Vec3d& wi,
                          Scattering scattering);
 
@@ -223,6 +301,142 @@ ScaledColor<T> eval_bsdf(const Phong& b, const SurfacePoint<T>& at, const Vec3<T
   return {log(cos_o), color};
 }
 
+template <Scalar T>
+ScaledColor<T> eval_bsdf(const ThinDielectric&, const SurfacePoint<T>&, const Vec3<T>&,
+                         const Vec3<T>&) {
+  return ScaledColor<T>::zero();
+}
+
+template <Scalar T>
+ScaledColor<T> eval_bsdf(const Plastic& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                         const Vec3<T>& wo) {
+  using std::log;
+  const T cos_i = dot(at.n, wi);
+  const T cos_o = dot(at.n, wo);
+  if (value(cos_i) <= 0.0 || value(cos_o) <= 0.0) return ScaledColor<T>::zero();
+  const T t_i = 1.0 - fresnel_dielectric(cos_i, b.eta);
+  const T t_o = 1.0 - fresnel_dielectric(cos_o, b.eta);
+  return {log(cos_o * t_i * t_o * (kInvPi * b.base.inverse_eta2)), b.base.albedo(at.uv)};
+}
+
+/// Its two parts: D G / (4 cos_i) F and cos_o T_i T_o / (pi eta^2), which the two reflectances are
+/// to be multiplied with.
+template <Scalar T>
+struct RoughPlasticParts {
+  T specular, diffuse;
+};
+template <Scalar T>
+RoughPlasticParts<T> rough_plastic_parts(const RoughPlastic& b, const T& cos_i, const T& cos_o,
+                                         const T& io) {
+  using std::exp;
+  using std::log;
+  using std::sqrt;
+  const T h2 = 2.0 + 2.0 * io;
+  const Microfacets& m = b.microfacets;
+  const T g = m.g1(cos_i) * m.g1(cos_o);
+  const T fresnel = fresnel_dielectric(T(0.5 * sqrt(h2)), b.eta);
+  const T d = exp(m.log_d(T(sqr(cos_i + cos_o) / h2)));
+  const T t = b.transmittance.eval(cos_i) * b.transmittance.eval(cos_o);
+  return {d * g * fresnel / (4.0 * cos_i), cos_o * t * (kInvPi * b.base.inverse_eta2)};
+}
+
+template <Scalar T>
+ScaledColor<T> eval_bsdf(const RoughPlastic& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                         const Vec3<T>& wo) {
+  const T cos_i = dot(at.n, wi);
+  const T cos_o = dot(at.n, wo);
+  if (value(cos_i) <= 0.0 || value(cos_o) <= 0.0) return ScaledColor<T>::zero();
+  const RoughPlasticParts<T> part = rough_plastic_parts(b, cos_i, cos_o, T(dot(wi, wo)));
+  const Rgb<T> specular = b.specular_reflectance.eval(at.uv);
+  const Rgb<T> diffuse = b.base.albedo(at.uv);
+  Rgb<T> color;
+  for (int c = 0; c < 3; ++c) color[c] = specular[c] * part.specular + diffuse[c] * part.diffuse;
+  return {constant<T>(0.0), color};
+}
+
+template <Scalar T>
+ScaledColor<T> eval_bsdf(const Mask& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                         const Vec3<T>& wo) {
+  if (b.nested == nullptr) return ScaledColor<T>::zero();
+  const ScaledColor<T> f = eval(b.nested->bsdf, at, wi, wo);
+  return {f.log_scale, b.opacity.eval(at.uv) * f.color};
+}
+
+/// F and 1 - F of an interface, passed from the side where n . wi has this sign.
+template <Scalar T>
+T interface_reflectance(double eta, const T& cos_i) {
+  using std::abs;
+  return fresnel_dielectric(T(abs(cos_i)), value(cos_i) > 0.0 ? eta : 1.0 / eta);
+}
+
+template <Scalar T>
+ScaledColor<T> eval_delta_lobe(const Conductor& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                               Scattering scattering) {
+  const T cos_i = dot(at.n, wi);
+  if (scattering == Scattering::Transmission || value(cos_i) <= 0.0) return ScaledColor<T>::zero();
+  return {constant<T>(0.0),
+          fresnel_conductor(cos_i, b.eta, b.k) * b.specular_reflectance.eval(at.uv)};
+}
+
+template <Scalar T>
+ScaledColor<T> eval_delta_lobe(const Dielectric& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                               Scattering scattering) {
+  using std::log;
+  const T cos_i = dot(at.n, wi);
+  const T fresnel = interface_reflectance(b.eta, cos_i);
+  if (scattering == Scattering::Reflection)
+    return {log(fresnel), b.specular_reflectance.eval(at.uv)};
+  if (value(fresnel) >= 1.0) return ScaledColor<T>::zero();
+  const double eta = value(cos_i) > 0.0 ? b.eta : 1.0 / b.eta;
+  return {log(1.0 - fresnel) - 2.0 * std::log(eta), b.specular_transmittance.eval(at.uv)};
+}
+
+/// 2 R / (1 + R) and (1 - R) / (1 + R), the same from both sides
+template <Scalar T>
+ScaledColor<T> eval_delta_lobe(const ThinDielectric& b, const SurfacePoint<T>& at,
+                               const Vec3<T>& wi, Scattering scattering) {
+  using std::abs;
+  using std::log;
+  const T r = fresnel_dielectric(T(abs(dot(at.n, wi))), b.eta);
+  if (scattering == Scattering::Reflection)
+    return {log(2.0 * r / (1.0 + r)), b.specular_reflectance.eval(at.uv)};
+  if (value(r) >= 1.0) return ScaledColor<T>::zero();
+  return {log((1.0 - r) / (1.0 + r)), b.specular_transmittance.eval(at.uv)};
+}
+
+template <Scalar T>
+ScaledColor<T> eval_delta_lobe(const Plastic& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                               Scattering scattering) {
+  using std::log;
+  const T cos_i = dot(at.n, wi);
+  if (scattering == Scattering::Transmission || value(cos_i) <= 0.0) return ScaledColor<T>::zero();
+  return {log(fresnel_dielectric(cos_i, b.eta)), b.specular_reflectance.eval(at.uv)};
+}
+
+template <Scalar T>
+ScaledColor<T> eval_delta_lobe(const Mask& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                               Scattering scattering) {
+  using std::exp;
+  const Rgb<T> opacity = b.opacity.eval(at.uv);
+  const bool passes = scattering == Scattering::Transmission;
+  if (b.nested == nullptr || !has_delta(b.nested->bsdf, scattering)) {
+    if (!passes) return ScaledColor<T>::zero();
+    return {constant<T>(0.0), constant<T>(Rgbd{1, 1, 1}) - opacity};
+  }
+  const ScaledColor<T> f = eval_delta(b.nested->bsdf, at, wi, scattering);
+  if (!passes) return {f.log_scale, opacity * f.color};
+  Rgb<T> color;
+  const T scale = exp(f.log_scale);
+  for (int c = 0; c < 3; ++c) color[c] = 1.0 - opacity[c] + opacity[c] * scale * f.color[c];
+  return {constant<T>(0.0), color};
+}
+
+/// Those that have no delta lobe.
+template <class B, Scalar T>
+ScaledColor<T> eval_delta_lobe(const B&, const SurfacePoint<T>&, const Vec3<T>&, Scattering) {
+  return ScaledColor<T>::zero();
+}
+
 }  // namespace detail
 
 template <Scalar T>
@@ -235,28 +449,16 @@ template <Scalar T>
 Vec3<T> delta_direction(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi,
                         Scattering scattering) {
   if (scattering == Scattering::Reflection) return reflect(wi, at.n);
-  const double eta = std::get<Dielectric>(bsdf).eta;
+  const double eta = delta_eta(bsdf);
+  if (eta == 1.0) return -wi;
   return refract(wi, at.n, value(dot(at.n, wi)) > 0.0 ? eta : 1.0 / eta);
 }
 
 template <Scalar T>
 ScaledColor<T> eval_delta(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi,
                           Scattering scattering) {
-  using std::abs;
-  using std::log;
-  const T cos_i = dot(at.n, wi);
-  if (const auto* metal = std::get_if<Conductor>(&bsdf)) {
-    if (value(cos_i) <= 0.0) return ScaledColor<T>::zero();
-    return {constant<T>(0.0), fresnel_conductor(cos_i, metal->eta, metal->k) *
-                                  metal->specular_reflectance.eval(at.uv)};
-  }
-  const auto& glass = std::get<Dielectric>(bsdf);
-  const double eta = value(cos_i) > 0.0 ? glass.eta : 1.0 / glass.eta;
-  const T fresnel = fresnel_dielectric(T(abs(cos_i)), eta);
-  if (scattering == Scattering::Reflection)
-    return {log(fresnel), glass.specular_reflectance.eval(at.uv)};
-  if (value(fresnel) >= 1.0) return ScaledColor<T>::zero();
-  return {log(1.0 - fresnel) - 2.0 * std::log(eta), glass.specular_transmittance.eval(at.uv)};
+  return std::visit([&](const auto& b) { return detail::eval_delta_lobe(b, at, wi, scattering); },
+                    bsdf);
 }
 
 }  // namespace driftlight

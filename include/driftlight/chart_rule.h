@@ -11,14 +11,8 @@
 
 namespace driftlight {
 
-/// What the rule knows of a vertex.
-enum class Lobe : std::uint8_t {
-  Delta,   ///< the next direction is determined: no edge may be joined here
-  Narrow,  ///< some lobe is glossy
-  Wide,    ///< diffuse: cares little about direction
-};
-
-Lobe lobe_of(const Bsdf& bsdf);
+/// The lobe of a vertex that goes on by a delta lobe, or by the BSDF's density.
+Lobe lobe_of(const Bsdf& bsdf, bool delta);
 
 /// Vertices on the light side of a path through these lobes, in order from the sensor, to the
 /// emitter of this index; 0: it has the chart of PhaseSpace::Directions, if any. None if it has no

@@ -127,6 +127,24 @@ class ConstraintVisitor : public WalkVisitor<T> {
     add_slopes(b.microfacets, slopes(e, eta), constant<S>(1.0));
   }
 
+  void constrain(const ThinDielectric&, const ScatterEvent<T>&) {}
+  void constrain(const Plastic&, const ScatterEvent<T>& e) { add_diffuse(e, constant<S>(1.0)); }
+  void constrain(const RoughPlastic& b, const ScatterEvent<T>& e) {
+    const Vec2<S> uv{strip(e.at.uv.x()), strip(e.at.uv.y())};
+    const auto part = detail::rough_plastic_parts(
+        b, S(strip(dot(e.at.n_s, e.wi))), S(strip(dot(e.at.n_s, e.wo))), S(strip(dot(e.wi, e.wo))));
+    const S specular = luminance(b.specular_reflectance.eval(uv)) * part.specular;
+    const S diffuse = luminance(b.base.albedo(uv)) * part.diffuse;
+    if (!(value(specular) + value(diffuse) > 0.0)) return;
+    const S share = specular / (specular + diffuse);
+    if (value(share) > 0.0) add_slopes(b.microfacets, slopes(e, 1.0), share);
+    if (value(share) < 1.0) add_diffuse(e, 1.0 - share);
+  }
+  void constrain(const Mask& b, const ScatterEvent<T>& e) {
+    if (b.nested == nullptr) return;
+    std::visit([&](const auto& nested) { constrain(nested, e); }, b.nested->bsdf);
+  }
+
   /// Two lobes, each weighted by its share of f at X. The glossy one constrains wo to the mirror
   /// direction with sigma = 1 / sqrt(n).
   void constrain(const Phong& b, const ScatterEvent<T>& e) {

@@ -93,7 +93,7 @@ class ContributionVisitor : public WalkVisitor<T> {
     multiply(eval_delta(e.bsdf, e.surface(), e.wo, e.scattering));
     log_scale_ += log(abs(cos_o * dot(n_g, e.wi) / (dot(n_s, e.wi) * dot(n_g, e.wo))));
     if (e.scattering == Scattering::Reflection) return;
-    const double eta = std::get<Dielectric>(e.bsdf).eta;
+    const double eta = delta_eta(e.bsdf);
     log_scale_ = log_scale_ + 2.0 * std::log(value(cos_o) > 0.0 ? eta : 1.0 / eta);
   }
   void area_emission(const AreaEmitter& emitter, const Vec3<T>& normal, const Vec3<T>& v) {

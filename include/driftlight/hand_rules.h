@@ -25,7 +25,14 @@
 ///   Fresnel, metal      with S = a^2 + b^2, dS = 2 c D / S dc, da = c a / S dc           (H10)
 ///   Phong            log c_o + log(rho_d / pi + rho_s P(mu)), mu = 2 c_i c_o - m, P' = n P / mu
 ///                                                                                        (H11)
+///   plastic          log c_o + log T(c_i) T(c_o), T = 1 - F, T' = -F'                   (H29)
+///   rough plastic    log(rho_s E + a B), E = F D G / (4 c_i) as rough metal, B = c_o T(c_i)
+///   T(c_o):
+///                    the partials of log E and log B by their shares                      (H30)
 /// Delta lobes:
+///   thin pane        log 2 R / (1 + R):  dR / (R (1 + R));
+///                    log (1 - R) / (1 + R):  -2 dR / (1 - R^2)                           (H31)
+///   mask             w = 1 - o + o p, p of a pane within:  dw = (p - 1) do + o dp        (H32)
 ///   mirror           dv = 2 c dn + 2 n (wi.dn + n.dwi) - dwi                             (H12)
 ///   refraction       v = k n - wi / eta, k = c / eta - s r, r = sqrt(1 - (1 - c^2) / eta^2):
 ///                    dv = k dn + n k' dc - dwi / eta,  k' = 1 / eta - s c / (eta^2 r)    (H13)
@@ -86,7 +93,7 @@ struct SurfaceDifferential {
   }
 };
 
-/// The rules (H2) to (H18), (H23) to (H25). A class, so that a test can replace single ones by
+/// The rules (H2) to (H18), (H23) to (H32). A class, so that a test can replace single ones by
 /// wrong ones.
 struct HandRules {
   // ---- Microfacets ----
@@ -281,6 +288,82 @@ struct HandRules {
     return f;
   }
 
+  static FactorPartials scatter(const ThinDielectric&, double, double, double, const Vec2d&,
+                                Scattering) {
+    FactorPartials f;
+    f.color.setZero();
+    return f;
+  }
+
+  /// The reflectance a = rho / (1 - rho r) of a base under a coat, and its derivatives by u and v:
+  ///   da = drho / (1 - rho r)^2  nonlinear,  drho / (1 - r)  else
+  struct Albedo {
+    Rgbd value, u, v;
+  };
+  static Albedo albedo(const DiffuseBase& b, const Vec2d& uv) {
+    const Rgbd rho = b.reflectance.eval(uv);
+    const Texture::Slopes slopes = b.reflectance.slopes(uv);
+    const double r = b.internal_reflectance;
+    const Rgbd inverse = 1.0 / (1.0 - r * (b.nonlinear ? rho : Rgbd::Ones()));
+    const Rgbd slope = b.nonlinear ? Rgbd(inverse * inverse) : inverse;
+    return {rho * inverse, slope * slopes.u, slope * slopes.v};
+  }
+
+  /// (H29)
+  static FactorPartials scatter(const Plastic& b, double cos_i, double cos_o, double,
+                                const Vec2d& uv, Scattering) {
+    FactorPartials f;
+    const Fresnel in = fresnel(cos_i, b.eta);
+    const Fresnel out = fresnel(cos_o, b.eta);
+    f.cos_i[3] = -in.slope / (1.0 - in.value);
+    f.cos_o[3] = 1.0 / cos_o - out.slope / (1.0 - out.value);
+    const Albedo a = albedo(b.base, uv);
+    f.color = a.value;
+    f.u.head<3>() = log_slope(a.u, a.value);
+    f.v.head<3>() = log_slope(a.v, a.value);
+    return f;
+  }
+
+  /// (H30)
+  static FactorPartials scatter(const RoughPlastic& b, double cos_i, double cos_o, double io,
+                                const Vec2d& uv, Scattering) {
+    const auto part = detail::rough_plastic_parts(b, cos_i, cos_o, io);
+    FactorPartials coat;
+    add_microfacets(b.microfacets, 1.0, cos_i, cos_o, io, coat);
+    const double h = std::sqrt(2.0 + 2.0 * io);
+    const Fresnel fresnel_h = fresnel(0.5 * h, b.eta);
+    coat.io[3] += fresnel_h.slope / fresnel_h.value * (0.5 / h);
+    const double base_i = b.transmittance.slope(cos_i) / b.transmittance.eval(cos_i);
+    const double base_o = b.transmittance.slope(cos_o) / b.transmittance.eval(cos_o) + 1.0 / cos_o;
+    const Rgbd specular = b.specular_reflectance.eval(uv) * part.specular;
+    const Texture::Slopes slopes = b.specular_reflectance.slopes(uv);
+    const Albedo a = albedo(b.base, uv);
+    const Rgbd diffuse = a.value * part.diffuse;
+    FactorPartials f;
+    f.color = specular + diffuse;
+    const auto by = [&](double d_coat, double d_base) {
+      return log_slope(specular * d_coat + diffuse * d_base, f.color);
+    };
+    f.cos_i.head<3>() = by(coat.cos_i[3], base_i);
+    f.cos_o.head<3>() = by(coat.cos_o[3], base_o);
+    f.io.head<3>() = by(coat.io[3], 0.0);
+    f.u.head<3>() = log_slope(slopes.u * part.specular + a.u * part.diffuse, f.color);
+    f.v.head<3>() = log_slope(slopes.v * part.specular + a.v * part.diffuse, f.color);
+    return f;
+  }
+
+  static FactorPartials scatter(const Mask& b, double cos_i, double cos_o, double io,
+                                const Vec2d& uv, Scattering scattering) {
+    FactorPartials f;
+    if (b.nested == nullptr) {
+      f.color.setZero();
+      return f;
+    }
+    f = scatter(b.nested->bsdf, cos_i, cos_o, io, uv, scattering);
+    add_texture(b.opacity, uv, f);
+    return f;
+  }
+
   static FactorPartials scatter(const Bsdf& bsdf, double cos_i, double cos_o, double io,
                                 const Vec2d& uv, Scattering scattering) {
     return std::visit([&](const auto& b) { return scatter(b, cos_i, cos_o, io, uv, scattering); },
@@ -288,27 +371,89 @@ struct HandRules {
   }
 
   /// Weight of a delta lobe: R or 1 - R, and its texture.
-  static FactorPartials delta(const Bsdf& bsdf, double cos_i, const Vec2d& uv,
-                              Scattering scattering) {
+  static FactorPartials delta_lobe(const Conductor& b, double cos_i, const Vec2d& uv, Scattering) {
     FactorPartials f;
-    if (const auto* metal = std::get_if<Conductor>(&bsdf)) {
-      const RgbFresnel r = fresnel(cos_i, metal->eta, metal->k);
-      f.color = r.value;
-      f.cos_i.head<3>() = log_slope(r.slope, r.value);
-      add_texture(metal->specular_reflectance, uv, f);
-      return f;
-    }
-    const auto& glass = std::get<Dielectric>(bsdf);
-    const Fresnel r = fresnel(std::abs(cos_i), cos_i > 0.0 ? glass.eta : 1.0 / glass.eta);
+    const RgbFresnel r = fresnel(cos_i, b.eta, b.k);
+    f.color = r.value;
+    f.cos_i.head<3>() = log_slope(r.slope, r.value);
+    add_texture(b.specular_reflectance, uv, f);
+    return f;
+  }
+  static FactorPartials delta_lobe(const Dielectric& b, double cos_i, const Vec2d& uv,
+                                   Scattering scattering) {
+    FactorPartials f;
+    const Fresnel r = fresnel(std::abs(cos_i), cos_i > 0.0 ? b.eta : 1.0 / b.eta);
     const double slope = std::copysign(1.0, cos_i) * r.slope;
     if (scattering == Scattering::Reflection) {
       f.cos_i[3] = slope / r.value;
-      add_texture(glass.specular_reflectance, uv, f);
+      add_texture(b.specular_reflectance, uv, f);
     } else {
       f.cos_i[3] = -slope / (1.0 - r.value);
-      add_texture(glass.specular_transmittance, uv, f);
+      add_texture(b.specular_transmittance, uv, f);
     }
     return f;
+  }
+  /// (H31)
+  static FactorPartials delta_lobe(const ThinDielectric& b, double cos_i, const Vec2d& uv,
+                                   Scattering scattering) {
+    FactorPartials f;
+    const Fresnel r = fresnel(std::abs(cos_i), b.eta);
+    const double slope = std::copysign(1.0, cos_i) * r.slope / (1.0 + r.value);
+    if (scattering == Scattering::Reflection) {
+      f.cos_i[3] = slope / r.value;
+      add_texture(b.specular_reflectance, uv, f);
+    } else {
+      f.cos_i[3] = -2.0 * slope / (1.0 - r.value);
+      add_texture(b.specular_transmittance, uv, f);
+    }
+    return f;
+  }
+  static FactorPartials delta_lobe(const Plastic& b, double cos_i, const Vec2d& uv, Scattering) {
+    FactorPartials f;
+    const Fresnel r = fresnel(cos_i, b.eta);
+    f.cos_i[3] = r.slope / r.value;
+    add_texture(b.specular_reflectance, uv, f);
+    return f;
+  }
+  /// (H32)
+  static FactorPartials delta_lobe(const Mask& b, double cos_i, const Vec2d& uv,
+                                   Scattering scattering) {
+    const bool has_lobe = b.nested != nullptr && has_delta(b.nested->bsdf, scattering);
+    FactorPartials f;
+    Rgbd weight = Rgbd::Zero();
+    if (has_lobe) {
+      f = delta(b.nested->bsdf, cos_i, uv, scattering);
+      if (scattering == Scattering::Reflection) {
+        add_texture(b.opacity, uv, f);
+        return f;
+      }
+      // Straight on, the same from any normal: wi itself matters only through its cosine.
+      const Vec3d wi(std::sqrt(std::max(0.0, 1.0 - cos_i * cos_i)), 0.0, cos_i);
+      const ScaledColor<double> w =
+          eval_delta(b.nested->bsdf, SurfacePoint<double>{Vec3d::UnitZ(), uv}, wi, scattering);
+      weight = std::exp(w.log_scale) * w.color;
+    }
+    const Rgbd opacity = b.opacity.eval(uv);
+    const Texture::Slopes slopes = b.opacity.slopes(uv);
+    f.color = 1.0 - opacity + opacity * weight;
+    const Rgbd d_cosine = opacity * weight * (f.cos_i.head<3>() + f.cos_i[3]);
+    f.cos_i << log_slope(d_cosine, f.color), 0.0;
+    const Rgbd d_u = (weight - 1.0) * slopes.u + opacity * weight * f.u.head<3>();
+    const Rgbd d_v = (weight - 1.0) * slopes.v + opacity * weight * f.v.head<3>();
+    f.u.head<3>() = log_slope(d_u, f.color);
+    f.v.head<3>() = log_slope(d_v, f.color);
+    return f;
+  }
+  /// Those that have no delta lobe.
+  template <class B>
+  static FactorPartials delta_lobe(const B&, double, const Vec2d&, Scattering) {
+    FactorPartials f;
+    f.color.setZero();
+    return f;
+  }
+  static FactorPartials delta(const Bsdf& bsdf, double cos_i, const Vec2d& uv,
+                              Scattering scattering) {
+    return std::visit([&](const auto& b) { return delta_lobe(b, cos_i, uv, scattering); }, bsdf);
   }
 
   // ---- Directions of delta lobes ----
@@ -319,7 +464,8 @@ struct HandRules {
   };
   static DeltaMap delta_map(const Bsdf& bsdf, double cos_i, Scattering scattering) {
     if (scattering == Scattering::Reflection) return {2.0 * cos_i, 2.0, -1.0};
-    const double glass = std::get<Dielectric>(bsdf).eta;
+    const double glass = delta_eta(bsdf);
+    if (glass == 1.0) return {0.0, 0.0, -1.0};
     const double inverse = cos_i > 0.0 ? 1.0 / glass : glass;
     const double root = std::sqrt(1.0 - (1.0 - cos_i * cos_i) * inverse * inverse);
     const double s = cos_i > 0.0 ? 1.0 : -1.0;

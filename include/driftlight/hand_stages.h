@@ -300,16 +300,20 @@ class StageSweep : RecordedPath<Rules> {
   }
 
   void residuals(const Vertex& x, const Columns& dwi, const Columns& dwo, const Columns& dn) {
-    std::visit([&](const auto& bsdf) { constrain(bsdf, x, dwi, dwo, dn); }, *x.bsdf);
+    residuals(*x.bsdf, x, dwi, dwo, dn);
+  }
+  void residuals(const Bsdf& bsdf, const Vertex& x, const Columns& dwi, const Columns& dwo,
+                 const Columns& dn) {
+    std::visit([&](const auto& b) { constrain(b, x, dwi, dwo, dn); }, bsdf);
   }
 
   /// (H19)
   void slopes(const Microfacets& microfacets, double e, const Vertex& x, const Columns& dwi,
-              const Columns& dwo, const Columns& dn) {
+              const Columns& dwo, const Columns& dn, double share = 1.0) {
     const double hn = x.cos_i + e * x.cos_o;
     const Vec3d m = (x.wi + e * x.wo) / hn;
     const double s2 = (m - x.n_s).squaredNorm();
-    const double factor = 1.0 / (3.0 * std::sqrt(microfacets.slope_variance(s2)));
+    const double factor = std::sqrt(share) / (3.0 * std::sqrt(microfacets.slope_variance(s2)));
     const Columns dh = dwi + e * dwo;
     const LocalRow along = dot(x.n_s, dh) / hn + dot(m, dn);
     add(factor, (1.0 / hn) * dh - outer(m, along) - dn);
@@ -355,6 +359,28 @@ class StageSweep : RecordedPath<Rules> {
       add(std::sqrt(share * b.exponent) / 3.0, dwo - mirror);
     }
     if (share < 1.0) diffuse(x, dwo, dn, 1.0 - share);
+  }
+
+  void constrain(const ThinDielectric&, const Vertex&, const Columns&, const Columns&,
+                 const Columns&) {}
+  void constrain(const Plastic&, const Vertex& x, const Columns&, const Columns& dwo,
+                 const Columns& dn) {
+    diffuse(x, dwo, dn, 1.0);
+  }
+  /// (H21) with (H19) in the place of the mirror direction
+  void constrain(const RoughPlastic& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
+                 const Columns& dn) {
+    const auto part = detail::rough_plastic_parts(b, x.cos_i, x.cos_o, x.io);
+    const double glossy = luminance(b.specular_reflectance.eval(x.uv)) * part.specular;
+    const double matt = luminance(b.base.albedo(x.uv)) * part.diffuse;
+    if (!(glossy + matt > 0.0)) return;
+    const double share = glossy / (glossy + matt);
+    if (share > 0.0) slopes(b.microfacets, 1.0, x, dwi, dwo, dn, share);
+    if (share < 1.0) diffuse(x, dwo, dn, 1.0 - share);
+  }
+  void constrain(const Mask& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
+                 const Columns& dn) {
+    if (b.nested != nullptr) residuals(b.nested->bsdf, x, dwi, dwo, dn);
   }
 
   /// w_o = e / r with e = y - x: (H18)

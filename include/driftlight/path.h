@@ -34,6 +34,13 @@ enum class PathEnd : std::uint8_t {
   DirectionalEmission,    ///< from a point on a disk across the light of a directional emitter
 };
 
+/// What the choice of coordinates knows of a vertex (chart_rule.h).
+enum class Lobe : std::uint8_t {
+  Delta,   ///< the next direction is determined: no edge may be joined here
+  Narrow,  ///< some lobe is glossy
+  Wide,    ///< diffuse: cares little about direction
+};
+
 /// A surface vertex x_1, x_2, .. of a path.
 struct PathVertex {
   Hit hit;

@@ -26,11 +26,14 @@ enum class TraceStatus : std::uint8_t {
 /// True if points on an area emitter of this shape can be coordinates: planar ones and spheres.
 bool has_points(const Shape& emitter);
 
-/// True if a path whose last scattering vertex has this BSDF reaches the area emitter through a
+/// True if a path whose last scattering vertex has this lobe reaches the area emitter through a
 /// connection; else its last direction is free to hit it. A function of the lobe and the emitter
 /// only, so that each path has exactly one chart: diffuse lobes, which care little about direction,
 /// connect; and only to emitters that have points.
-bool connects_to_area(const Bsdf& last, const Shape& emitter);
+bool connects_to_area(Lobe last, const Shape& emitter);
+
+/// True if the BSDF has the lobe by which the vertex goes on.
+bool has_lobe(const Bsdf& bsdf, const PathVertex& vertex);
 
 /// Radiance may pass from wo to wi: both lie on the same side of the geometric and of the shading
 /// normal (Veach's remedy for light leaks through interpolated normals).

@@ -134,6 +134,60 @@ Bsdf read_phong(Properties& properties, LoadContext& context) {
   return bsdf;
 }
 
+/// Fills in what smooth and rough plastics have in common; `make` takes eta, diffuse and specular
+/// reflectance, and `nonlinear`.
+template <class Make>
+Bsdf read_coated(Properties& properties, LoadContext& context, const Make& make) {
+  const double eta =
+      read_index(properties, "intIOR", "polypropylene") / read_index(properties, "extIOR", "air");
+  if (eta == 1.0)
+    properties.element().fail("'intIOR' and 'extIOR' of " + properties.description() +
+                              " must differ");
+  const Texture diffuse =
+      read_scattering(properties, context, "diffuseReflectance", Rgbd::Constant(0.5));
+  const Texture specular = read_scattering(properties, context, "specularReflectance", kWhite);
+  return make(eta, diffuse, specular, properties.boolean("nonlinear", false));
+}
+
+Bsdf read_plastic(Properties& properties, LoadContext& context) {
+  return read_coated(properties, context, [](auto&&... of) { return Plastic(of...); });
+}
+
+Bsdf read_rough_plastic(Properties& properties, LoadContext& context) {
+  const Microfacets microfacets = read_microfacets(properties, context);
+  return read_coated(properties, context,
+                     [&](auto&&... of) { return RoughPlastic(microfacets, of...); });
+}
+
+Bsdf read_thin_dielectric(Properties& properties, LoadContext& context) {
+  const auto bsdf = read_interface<ThinDielectric>(properties, context);
+  if (bsdf.eta == 1.0)
+    properties.element().fail("'intIOR' and 'extIOR' of a thindielectric must differ");
+  return bsdf;
+}
+
+Bsdf read_null(Properties&, LoadContext&) { return Mask{Texture(Rgbd::Zero()), nullptr}; }
+
+/// Each side masks its own BSDF. Black back sides let pass too.
+Surface read_mask(Properties& properties, LoadContext& context) {
+  const std::vector<Element> nested = properties.nested({"bsdf", "ref"});
+  if (nested.size() != 1) properties.element().fail("a mask needs one nested bsdf");
+  const std::shared_ptr<Surface> surface = read_surface(nested.front(), context);
+  if (delta_eta(surface->front) != 1.0)
+    nested.front().fail("a smooth dielectric cannot be nested in a mask: a thindielectric can");
+  const Texture opacity = read_textured(properties, "opacity", Rgbd::Constant(0.5), context);
+  if (opacity.maximum() > 1.0) properties.fail("opacity", "must be between 0 and 1");
+  const auto masked = [&](const Bsdf& bsdf) {
+    return Mask{opacity, std::make_shared<const BsdfBox>(BsdfBox{bsdf})};
+  };
+  Surface result{masked(surface->front), std::nullopt, std::nullopt};
+  if (surface->back)
+    result.back = masked(*surface->back);
+  else if (!is_transmissive(surface->front))
+    result.back = Mask{opacity, nullptr};
+  return result;
+}
+
 Surface read_two_sided(Properties& properties, LoadContext& context) {
   const std::vector<Element> nested = properties.nested({"bsdf", "ref"});
   if (nested.empty() || nested.size() > 2)
@@ -141,7 +195,8 @@ Surface read_two_sided(Properties& properties, LoadContext& context) {
   std::vector<Bsdf> sides;
   for (const Element& element : nested) {
     const std::shared_ptr<Surface> side = read_surface(element, context);
-    if (side->back || is_transmissive(side->front))
+    const bool transmits = has_delta(side->front, Scattering::Transmission);
+    if (side->back || transmits || is_transmissive(side->front))
       element.fail("only a one-sided bsdf without transmission can be nested in twosided");
     sides.push_back(side->front);
   }
@@ -155,13 +210,18 @@ Surface one_sided(Properties& properties, LoadContext& context) {
 }
 
 using BsdfReader = Surface (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, BsdfReader>, 7> kBsdfs{{
+constexpr std::array<std::pair<std::string_view, BsdfReader>, 12> kBsdfs{{
     {"diffuse", &one_sided<read_diffuse>},
     {"conductor", &one_sided<read_conductor>},
     {"roughconductor", &one_sided<read_rough_conductor>},
     {"dielectric", &one_sided<read_dielectric>},
     {"roughdielectric", &one_sided<read_rough_dielectric>},
     {"phong", &one_sided<read_phong>},
+    {"plastic", &one_sided<read_plastic>},
+    {"roughplastic", &one_sided<read_rough_plastic>},
+    {"thindielectric", &one_sided<read_thin_dielectric>},
+    {"null", &one_sided<read_null>},
+    {"mask", &read_mask},
     {"twosided", &read_two_sided},
 }};
 

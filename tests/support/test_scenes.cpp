@@ -262,6 +262,10 @@ Scene overcast() {
   return make->build();
 }
 
+std::shared_ptr<const BsdfBox> boxed(Bsdf bsdf) {
+  return std::make_shared<const BsdfBox>(BsdfBox{std::move(bsdf)});
+}
+
 Scene stage() {
   Workshop make;
   const auto plain = make.one_sided(Diffuse{gray(0.7)});
@@ -284,6 +288,46 @@ Scene stage() {
 
 }  // namespace
 
+Scene coated(bool with_point) {
+  Workshop make;
+  const auto plain = make.one_sided(Diffuse{gray(0.7)});
+  add_walls(make, make.one_sided(Plastic(kGlass, textured(8, 0.1, 0.8), textured(4, 0.4, 1), true)),
+            make.one_sided(Plastic(1.3, gray(0.7), gray(1.0), false)), plain);
+  make->add_shape(sphere_at({-0.9, 0.5, 0.1}, 0.5),
+                  make.one_sided(RoughPlastic(beckmann(0.2), kGlass, textured(8, 0.1, 0.8),
+                                              textured(4, 0.4, 1), true)));
+  make->add_shape(round_mesh({0.3, 0.5, -0.2}, 0.5, 8),
+                  make.one_sided(RoughPlastic(ggx(0.25), kGlass, gray(0.4), gray(1.0), false)));
+  const Texture tint = textured(8, 0.5, 1.0);
+  make->add_shape(quad({-1.7, 0.1, 1.0}, {1.0, 0, 0.3}, {0, 1.2, 0}, true, 0.1),
+                  make.one_sided(ThinDielectric{kGlass, tint, tint}));
+  make->add_shape(sphere_at({0.0, 0.3, 1.0}, 0.3),
+                  make.one_sided(ThinDielectric{kGlass, gray(1.0), gray(1.0)}));
+  const Texture holes = textured(8, 0.1, 0.9);
+  make->add_shape(
+      quad({0.4, 0.1, 0.9}, {0.8, 0, -0.2}, {0, 1.0, 0}, true),
+      make.two_sided(
+          Mask{holes, boxed(Diffuse{textured(8, 0.3, 0.8)})},
+          Mask{holes, boxed(RoughPlastic(ggx(0.3), kGlass, gray(0.5), gray(1.0), false))}));
+  make->add_shape(
+      sphere_at({1.3, 0.45, 0.3}, 0.45),
+      make.one_sided(Mask{textured(8, 0.2, 0.8), boxed(ThinDielectric{kGlass, gray(1.0), tint})}));
+  make->add_shape(sphere_at({1.1, 1.5, -0.6}, 0.4),
+                  make.two_sided(Mask{gray(0.6), boxed(Plastic(kGlass, gray(0.6), tint, false))},
+                                 Mask{gray(0.6), nullptr}));
+  make->add_shape(sphere_at({-0.3, 1.5, -0.8}, 0.4), make.one_sided(Mask{gray(0.0), nullptr}));
+  const auto black = make.one_sided(Diffuse{gray(0.0)});
+  make->add_shape(quad({-0.9, 2.8, -0.6}, {1.8, 0, 0}, {0, 0, 1.4}), black, Rgbd{4, 4, 4});
+  make->add_shape(round_mesh({-1.4, 1.9, -0.5}, 0.35, 4, false), black, Rgbd{6, 7, 8});
+  if (with_point) make->add_emitter(PointEmitter{{1.3, 2.4, 1.2}, {3, 3, 2.5}});
+  PerspectiveCamera camera = look_at({0, 1.4, 3.6}, {0, 0.9, 0}, 0.5);
+  camera.half_height = 0.375;
+  camera.film_width = 32;
+  camera.film_height = 24;
+  make->set_camera(camera);
+  return make->build();
+}
+
 const std::vector<TestScene>& test_scenes() {
   static const std::vector<TestScene> scenes = [] {
     std::vector<TestScene> result;
@@ -292,6 +336,7 @@ const std::vector<TestScene>& test_scenes() {
     result.push_back({"sun", sun(), 6});
     result.push_back({"overcast", overcast(), 6});
     result.push_back({"stage", stage(), 6});
+    result.push_back({"coated", coated(true), 6});
     return result;
   }();
   return scenes;

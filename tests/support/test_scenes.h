@@ -23,7 +23,12 @@ struct TestScene {
 ///   sun        glossy things under an environment map with a small bright sun, behind a window
 ///   overcast   the same kinds under a constant environment, seen through a rough window
 ///   stage      diffuse and glossy things under a spot and parallel light, behind smooth glass
+///   coated     smooth and rough plastic, panes, masks and what only lets pass
 const std::vector<TestScene>& test_scenes();
+
+/// The last of them, with a film of 32 x 24 pixels; path tracing finds all its light without the
+/// point emitter.
+Scene coated(bool with_point);
 
 /// Paths that carry light, drawn from a scene by its PathSampler.
 std::vector<PathSampler::Sample> light_paths(const TestScene& scene, int count, std::uint64_t seed);

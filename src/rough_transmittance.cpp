@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "driftlight/rough_transmittance.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "driftlight/fresnel.h"
+
+namespace driftlight {
+namespace {
+
+/// int F D G / (4 cos_i) d omega_o, over facets: F G cos_ih / (cos_i cos_h) of D cos_h, which is
+/// sampled at the midpoints of a grid of its random numbers.
+double reflectance(const Microfacets& m, double eta, double cos_i) {
+  constexpr int kPolar = 48;
+  constexpr int kAround = 48;
+  const Vec3d wi(std::sqrt(1.0 - cos_i * cos_i), 0.0, cos_i);
+  double sum = 0.0;
+  for (int i = 0; i < kPolar; ++i) {
+    for (int j = 0; j < kAround; ++j) {
+      const Vec3d h = m.sample(wi, (i + 0.5) / kPolar, (j + 0.5) / kAround);
+      const double ih = wi.dot(h);
+      if (ih <= 0.0) continue;
+      const double cos_o = 2.0 * ih * h.z() - cos_i;
+      if (cos_o <= 0.0) continue;
+      const double d = std::exp(m.log_d(h.z() * h.z()));
+      const double g = m.g1(cos_i) * m.g1(cos_o);
+      sum += fresnel_dielectric(ih, eta) * d * g * ih / (cos_i * m.pdf(cos_i, h.z(), ih));
+    }
+  }
+  return sum / (kPolar * kAround);
+}
+
+}  // namespace
+
+RoughTransmittance::RoughTransmittance(const Microfacets& microfacets, double eta) {
+  constexpr double kGrazing = 1e-4;
+  for (int i = 0; i <= kCells; ++i) {
+    const double cosine = std::max(kGrazing, static_cast<double>(i) / kCells);
+    table_[static_cast<std::size_t>(i)] =
+        std::clamp(1.0 - reflectance(microfacets, eta, cosine), 0.0, 1.0);
+  }
+  // Coefficients c of the spline through these values f: (c_(i-1) + 4 c_i + c_(i+1)) / 6 = f_i, and
+  // c = f at the ends, where the curvature is 0. Elimination, then substitution backward.
+  std::array<double, kCells> pivots{};
+  for (std::size_t i = 1; i < kCells; ++i) {
+    pivots[i] = 4.0 - (i > 1 ? 1.0 / pivots[i - 1] : 0.0);
+    table_[i] = 6.0 * table_[i] - table_[i - 1] / (i > 1 ? pivots[i - 1] : 1.0);
+  }
+  for (std::size_t i = kCells - 1; i > 0; --i) table_[i] = (table_[i] - table_[i + 1]) / pivots[i];
+}
+
+/// Beyond the ends the coefficients go on straight.
+RoughTransmittance::Cubic RoughTransmittance::cubic(double cosine) const {
+  const int cell = std::clamp(static_cast<int>(cosine * kCells), 0, kCells - 1);
+  const auto i = static_cast<std::size_t>(cell);
+  const double c1 = table_[i];
+  const double c2 = table_[i + 1];
+  const double c0 = cell > 0 ? table_[i - 1] : 2.0 * c1 - c2;
+  const double c3 = cell + 1 < kCells ? table_[i + 2] : 2.0 * c2 - c1;
+  return {{(c0 + 4.0 * c1 + c2) / 6.0, 0.5 * (c2 - c0), 0.5 * (c0 + c2) - c1,
+           (c3 - c0) / 6.0 + 0.5 * (c1 - c2)},
+          static_cast<double>(cell)};
+}
+
+/// Simpson's rule.
+double RoughTransmittance::diffuse() const {
+  double sum = 0.0;
+  const auto f = [&](double cosine) { return 2.0 * cosine * eval(cosine); };
+  for (int i = 0; i < kCells; ++i) {
+    const double a = static_cast<double>(i) / kCells;
+    const double b = (i + 1.0) / kCells;
+    sum += (f(a) + 4.0 * f(0.5 * (a + b)) + f(b)) / (6.0 * kCells);
+  }
+  return sum;
+}
+
+}  // namespace driftlight
