@@ -107,7 +107,7 @@ TEST(Microfacets, SlopeVariance) {
   const Microfacets beckmann{Distribution::Beckmann, 0.3};
   Moments squares;
   for (int i = 0; i < 20000; ++i) {
-    const Vec3d h = beckmann.sample(Vec3d::UnitZ(), rng.uniform(), rng.uniform());
+    const Vec3d h = beckmann.sample<double>(Vec3d::UnitZ(), rng.uniform(), rng.uniform());
     squares.add(std::pow(h.x() / h.z(), 2));
   }
   EXPECT_NEAR(squares.mean(), beckmann.slope_variance(0.0), 4.5 * squares.error());
