@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "driftlight/frame.h"
+#include "driftlight/reconstruction_filter.h"
 
 namespace driftlight {
 
@@ -17,8 +18,10 @@ struct PerspectiveCamera {
   Vec3d forward{0, 0, 1};  ///< unit
   double half_width = 1;   ///< of the image plane: tan(fov_x / 2)
   double half_height = 1;
+  Vec2d center{0, 0};  ///< of the image plane's window, along right and up: where films are cropped
   int film_width = 256;  ///< pixels
   int film_height = 256;
+  ReconstructionFilter filter;
   double near_clip = 0;  ///< depth along `forward` before which nothing is seen
   double far_clip = std::numeric_limits<double>::infinity();
 
@@ -30,8 +33,8 @@ struct PerspectiveCamera {
 
   /// Unit direction through the film point.
   Vec3d direction(const Vec2d& film) const {
-    return (forward + (2.0 * film.x() - 1.0) * half_width * right +
-            (1.0 - 2.0 * film.y()) * half_height * up)
+    return (forward + ((2.0 * film.x() - 1.0) * half_width + center.x()) * right +
+            ((1.0 - 2.0 * film.y()) * half_height + center.y()) * up)
         .normalized();
   }
 
@@ -45,8 +48,8 @@ struct PerspectiveCamera {
   template <Scalar T>
   Vec2<T> film_position(const Vec3<T>& v) const {
     const T inverse = constant<T>(0.5) / cosine(v);
-    return {dot(right, v) * inverse * (1.0 / half_width) + 0.5,
-            0.5 - dot(up, v) * inverse * (1.0 / half_height)};
+    return {(dot(right, v) * inverse - 0.5 * center.x()) * (1.0 / half_width) + 0.5,
+            0.5 - (dot(up, v) * inverse - 0.5 * center.y()) * (1.0 / half_height)};
   }
 
   /// True if v goes through the film.
