@@ -27,7 +27,7 @@ LangevinResult run_chains(const Scene& scene, DirectLight direct_light, int max_
   const double pixels = scene.camera().pixel_count();
   RenderClock clock(render);
   const bool apart = direct_light == DirectLight::Apart;
-  Film film(scene.camera().film_width, scene.camera().film_height);
+  Film film(scene.camera().film_width, scene.camera().film_height, scene.camera().filter);
   auto chains = start(apart ? kDirectDepth + 1 : 1, film);
   const double bootstrap_seconds = clock.seconds();
   std::optional<DirectPass> direct;

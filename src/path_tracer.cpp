@@ -173,11 +173,13 @@ Rgbd PathTracer::radiance(const Vec3d& v, Rng& rng) const {
 
 PixelSums::PixelSums(const Scene& scene, int max_depth, std::uint64_t seed)
     : camera_(scene.camera()),
+      weights_(camera_.filter, camera_.film_width, camera_.film_height),
       tracer_(scene, max_depth),
       seed_(seed),
       sums_(static_cast<std::size_t>(camera_.film_width) *
                 static_cast<std::size_t>(camera_.film_height),
-            Rgbd::Zero()) {}
+            Rgbd::Zero()),
+      samples_(weights_.is_pixel() ? 0 : sums_.size()) {}
 
 void PixelSums::pass(std::uint64_t index) {
   const auto range =
@@ -186,6 +188,14 @@ void PixelSums::pass(std::uint64_t index) {
     for (int y = tile.rows().begin(); y < tile.rows().end(); ++y)
       for (int x = tile.cols().begin(); x < tile.cols().end(); ++x) add(x, y, index);
   });
+  if (!samples_.empty()) spread_samples();
+}
+
+void PixelSums::spread_samples() {
+  for (const Sample& sample : samples_)
+    weights_.spread(sample.film, [&](std::size_t pixel, double weight) {
+      sums_[pixel] += weight * sample.value;
+    });
 }
 
 Image PixelSums::image(std::uint64_t passes) const {
@@ -205,10 +215,12 @@ void PixelSums::add(int x, int y, std::uint64_t index) {
   const Vec2d jitter = rng.uniform2();
   const Vec2d film{(x + jitter.x()) / camera_.film_width, (y + jitter.y()) / camera_.film_height};
   const Rgbd sample = tracer_.radiance(camera_.direction(film), rng);
-  if (sample.allFinite())
+  const bool finite = sample.allFinite();
+  if (!finite) ++non_finite_;
+  if (!samples_.empty())
+    samples_[pixel] = {film, finite ? sample : Rgbd(Rgbd::Zero())};
+  else if (finite)
     sums_[pixel] += sample;
-  else
-    ++non_finite_;
 }
 
 }  // namespace driftlight

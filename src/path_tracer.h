@@ -42,11 +42,20 @@ class PixelSums {
 
  private:
   void add(int x, int y, std::uint64_t index);
+  /// Adds the samples of a pass through the filter, in the order of their pixels.
+  void spread_samples();
+
+  struct Sample {
+    Vec2d film;
+    Rgbd value;
+  };
 
   const PerspectiveCamera& camera_;
+  FilterWeights weights_;
   PathTracer tracer_;
   std::uint64_t seed_;
   std::vector<Rgbd> sums_;
+  std::vector<Sample> samples_;  ///< of this pass by pixel; none if a pixel is all the filter
   std::atomic<std::uint64_t> non_finite_{0};
 };
 

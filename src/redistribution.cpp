@@ -50,7 +50,7 @@ struct Redistribution {
         layers(render.layers),
         pilot(run_pilot(scene, options, render.seed)),
         remainder(scene, pilot.guide, pilot.brightness, options.redistribution.threshold),
-        film(scene.camera().film_width, scene.camera().film_height),
+        film(scene.camera().film_width, scene.camera().film_height, scene.camera().filter),
         unit(64.0 * pilot.brightness.max()),
         deposit(kLeastDeposit),
         splitting(scene, options, render, remainder, pilot.brightness, unit) {

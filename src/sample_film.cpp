@@ -5,6 +5,7 @@ namespace driftlight {
 
 SampleFilm::SampleFilm(const PerspectiveCamera& camera, std::uint64_t seed, int layers)
     : camera_(camera),
+      weights_(camera.filter, camera.film_width, camera.film_height),
       seed_(seed),
       sums_(static_cast<std::size_t>(camera.film_width) *
                 static_cast<std::size_t>(camera.film_height),
@@ -17,19 +18,27 @@ void SampleFilm::add(std::size_t pixel, int layer, const Rgbd& value) {
   if (!layers_.empty()) layers_[static_cast<std::size_t>(layer) * sums_.size() + pixel] += value;
 }
 
-std::uint32_t SampleFilm::pixel_at(const Vec2d& film) const {
+std::size_t SampleFilm::pixel_at(const Vec2d& film) const {
   const int x =
       std::clamp(static_cast<int>(film.x() * camera_.film_width), 0, camera_.film_width - 1);
   const int y =
       std::clamp(static_cast<int>(film.y() * camera_.film_height), 0, camera_.film_height - 1);
-  return static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(camera_.film_width) +
-         static_cast<std::uint32_t>(x);
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.film_width) +
+         static_cast<std::size_t>(x);
 }
 
 void SampleFilm::merge(std::size_t tasks) {
   for (std::size_t i = 0; i < tasks; ++i) {
     Task& task = tasks_[i];
-    for (const Splat& splat : task.splats) add(splat.pixel, splat.layer, splat.value);
+    for (const Splat& splat : task.splats) {
+      if (weights_.is_pixel()) {
+        add(pixel_at(splat.film), splat.layer, splat.value);
+        continue;
+      }
+      weights_.spread(splat.film, [&](std::size_t pixel, double weight) {
+        add(pixel, splat.layer, weight * splat.value);
+      });
+    }
     task.splats.clear();
     non_finite_ += task.non_finite;
     task.non_finite = 0;

@@ -15,10 +15,11 @@
 
 namespace driftlight {
 
-/// Sums of contributions by pixel, in double. Those of a sample to its own pixel are added at once;
-/// splats are kept, and added in the order of the samples once all samples of a batch are done. So
-/// all sums run in an order that does not depend on threads, and no range of values is assumed.
-/// With layers, each contribution is also added to the one that it names.
+/// Sums of contributions by pixel, in double, through the filter of the camera. Those of a sample
+/// to its own pixel are added at once if that is all the filter; splats are kept, and added in the
+/// order of the samples once all samples of a batch are done. So all sums run in an order that does
+/// not depend on threads, and no range of values is assumed. With layers, each contribution is also
+/// added to the one that it names.
 class SampleFilm {
  public:
   SampleFilm(const PerspectiveCamera& camera, std::uint64_t seed, int layers);
@@ -40,9 +41,9 @@ class SampleFilm {
 
  private:
   struct Splat {
-    std::uint32_t pixel;
-    std::int32_t layer;
+    Vec2d film;
     Rgbd value;
+    int layer;
   };
   /// Samples in a row of one task, and the most tasks whose splats are kept.
   static constexpr std::size_t kTask = 64;
@@ -54,11 +55,12 @@ class SampleFilm {
   };
 
   void add(std::size_t pixel, int layer, const Rgbd& value);
-  std::uint32_t pixel_at(const Vec2d& film) const;
+  std::size_t pixel_at(const Vec2d& film) const;
   /// Adds the splats of the first tasks.
   void merge(std::size_t tasks);
 
   const PerspectiveCamera& camera_;
+  FilterWeights weights_;
   std::uint64_t seed_;
   std::vector<Rgbd> sums_;
   std::vector<Rgbd> layers_;  ///< layer after layer
@@ -68,9 +70,11 @@ class SampleFilm {
 
 class SampleFilm::Sink {
  public:
-  Sink(SampleFilm& film, Task& task, std::size_t pixel) : film_(film), task_(task), pixel_(pixel) {}
+  Sink(SampleFilm& film, Task& task, std::size_t pixel, const Vec2d& position)
+      : film_(film), task_(task), pixel_(pixel), position_(position) {}
 
   void add(const Rgbd& value, int layer = 0) {
+    if (!film_.weights_.is_pixel()) return splat(position_, value, layer);
     if (value.allFinite())
       film_.add(pixel_, layer, value);
     else
@@ -79,7 +83,7 @@ class SampleFilm::Sink {
   /// At film coordinates in [0, 1)^2.
   void splat(const Vec2d& film, const Rgbd& value, int layer = 0) {
     if (value.allFinite())
-      task_.splats.push_back({film_.pixel_at(film), layer, value});
+      task_.splats.push_back({film, value, layer});
     else
       ++task_.non_finite;
   }
@@ -88,6 +92,7 @@ class SampleFilm::Sink {
   SampleFilm& film_;
   Task& task_;
   std::size_t pixel_;
+  Vec2d position_;  ///< of the sample
 };
 
 template <class Sampler>
@@ -106,7 +111,7 @@ void SampleFilm::pass(std::uint64_t index, const Sampler& prototype) {
         const Vec2d jitter = rng.uniform2();
         const Vec2d film{(static_cast<double>(x) + jitter.x()) / camera_.film_width,
                          (static_cast<double>(y) + jitter.y()) / camera_.film_height};
-        Sink sink(*this, tasks_[i], pixel);
+        Sink sink(*this, tasks_[i], pixel, film);
         sampler.sample(film, rng, sink);
       }
     });

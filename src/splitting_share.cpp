@@ -23,7 +23,7 @@ SplittingShare::SplittingShare(const Scene& scene, const LangevinOptions& option
       layers_(render.layers),
       levels_(scene, options.mode == Mode::Splitting ? options.splitting.levels : std::optional(0)),
       top_guide_(levels_[levels_.top()]),
-      film_(scene.camera().film_width, scene.camera().film_height),
+      film_(scene.camera().film_width, scene.camera().film_height, scene.camera().filter),
       unit_(unit),
       tiles_(scene.camera().film_width, scene.camera().film_height) {
   if (levels_.top() > 0) plan_ = plan_splitting(levels_, splitter(), options, render.seed);

@@ -289,13 +289,6 @@ TEST(Substitutes, AreNamed) {
     return directory.load(test::scene_file(sensor + kEmitter + kShape)).notices;
   };
   EXPECT_TRUE(notices(R"(<rfilter type="box"/>)", "").empty());
-  ASSERT_EQ(notices("", "").size(), 1U);
-  expect_contains(notices("", "")[0], "'gaussian'");
-  const std::string other = R"(<rfilter type="mitchell"><float name="B" value="0.3"/></rfilter>)";
-  ASSERT_EQ(notices(other, "").size(), 1U);
-  expect_contains(notices(other, "")[0], "rfilter 'mitchell' is not used");
-  const std::string wide = R"(<rfilter type="box"><float name="radius" value="2"/></rfilter>)";
-  EXPECT_EQ(notices(wide, "").size(), 1U);
   const std::vector<std::string> sampler =
       notices(R"(<rfilter type="box"/>)",
               R"(<sampler type="ldsampler"><integer name="sampleCount" value="48"/></sampler>)");

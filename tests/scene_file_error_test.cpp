@@ -280,14 +280,19 @@ const Fault kSensorFaults[] = {
      R"(<sensor type="perspective"><film type="hdrfilm">@<rfilter type="gauss"/>)"
      "</film></sensor>",
      {"rfilter 'gauss'", "box", "gaussian"}},
+    {"WideFilter",
+     R"(<sensor type="perspective"><film type="hdrfilm"><rfilter type="gaussian">)"
+     R"(@<float name="stddev" value="5"/></rfilter></film></sensor>)",
+     {"'stddev'", "radius 20", "0.1 and 16"}},
     {"TwoFilters",
      R"(<sensor type="perspective"><film type="hdrfilm"><rfilter type="box"/>@<rfilter type="box"/>)"
      "</film></sensor>",
      {"second rfilter"}},
     {"Crop",
      R"(<sensor type="perspective"><film type="hdrfilm"><rfilter type="box"/>)"
-     R"(@<integer name="cropWidth" value="9"/></film></sensor>)",
-     {"'cropWidth'"}},
+     R"(<integer name="width" value="8"/><integer name="cropOffsetX" value="2"/>)"
+     R"(@<integer name="cropWidth" value="7"/></film></sensor>)",
+     {"'cropWidth'", "from pixel 2 to 9 of a film of 8"}},
     {"HugeFilm",
      R"(<sensor type="perspective">@<film type="hdrfilm"><rfilter type="box"/>)"
      R"(<integer name="width" value="2000000000"/></film></sensor>)",

@@ -131,6 +131,63 @@ TEST(SensorXml, LooksAlongZWithXOnTheLeft) {
   EXPECT_EQ(camera.far_clip, 1e4);
 }
 
+// Law: each pixel of a crop window looks where that pixel of the whole film does.
+TEST(SensorXml, CropsTheFilm) {
+  const auto load = [](const std::string& crop) {
+    const SceneDirectory directory;
+    const std::string sensor =
+        R"(<sensor type="perspective"><float name="fov" value="70"/><film type="hdrfilm">
+           <integer name="width" value="40"/><integer name="height" value="30"/>)" +
+        crop + R"(<rfilter type="box"/></film></sensor>)";
+    return directory.load(scene_file(sensor + kEmitter + kShape)).scene.camera();
+  };
+  const PerspectiveCamera whole = load("");
+  const PerspectiveCamera part = load(
+      R"(<integer name="cropOffsetX" value="12"/><integer name="cropOffsetY" value="4"/>
+         <integer name="cropWidth" value="20"/><integer name="cropHeight" value="6"/>)");
+  EXPECT_EQ(part.film_width, 20);
+  EXPECT_EQ(part.film_height, 6);
+  for (const Vec2d& pixel : {Vec2d(0, 0), Vec2d(3.5, 1.25), Vec2d(19.9, 5.9)}) {
+    const Vec3d v = part.direction({pixel.x() / 20, pixel.y() / 6});
+    expect_near(v, whole.direction({(12 + pixel.x()) / 40, (4 + pixel.y()) / 30}));
+    EXPECT_LT((part.film_position(v) - Vec2d(pixel.x() / 20, pixel.y() / 6)).norm(), 1e-12);
+    EXPECT_TRUE(part.sees(v));
+  }
+  EXPECT_FALSE(part.sees(whole.direction({11.9 / 40, 0.2})));
+  EXPECT_NEAR(part.area(), whole.area() * 120 / 1200, 1e-12);
+}
+
+TEST(SensorXml, ReadsFilters) {
+  using Kind = ReconstructionFilter::Kind;
+  const auto load = [](const std::string& filter) {
+    const SceneDirectory directory;
+    const std::string sensor =
+        R"(<sensor type="perspective"><film type="hdrfilm">)" + filter + "</film></sensor>";
+    const LoadedScene loaded = directory.load(scene_file(sensor + kEmitter + kShape));
+    EXPECT_TRUE(loaded.notices.empty());
+    return loaded.scene.camera().filter;
+  };
+  const auto expect = [&](const std::string& text, Kind kind, double radius) {
+    const ReconstructionFilter filter = load(text);
+    EXPECT_EQ(filter.kind, kind) << text;
+    EXPECT_EQ(filter.radius, radius) << text;
+    return filter;
+  };
+  EXPECT_TRUE(load(R"(<rfilter type="box"/>)").is_pixel());
+  EXPECT_EQ(expect("", Kind::Gaussian, 2.0).sigma, 0.5);
+  expect(R"(<rfilter type="box"><float name="radius" value="2"/></rfilter>)", Kind::Box, 2.0);
+  expect(R"(<rfilter type="tent"/>)", Kind::Tent, 1.0);
+  expect(R"(<rfilter type="gaussian"><float name="stddev" value="0.25"/></rfilter>)",
+         Kind::Gaussian, 1.0);
+  EXPECT_EQ(expect(R"(<rfilter type="mitchell"><float name="B" value="0.3"/></rfilter>)",
+                   Kind::Cubic, 2.0)
+                .b,
+            0.3);
+  EXPECT_EQ(expect(R"(<rfilter type="catmullrom"/>)", Kind::Cubic, 2.0).c, 0.5);
+  expect(R"(<rfilter type="lanczos"><integer name="lobes" value="2"/></rfilter>)", Kind::Lanczos,
+         2.0);
+}
+
 TEST(SensorXml, LooksAtItsTarget) {
   const PerspectiveCamera camera = load_camera(
       R"(<float name="fov" value="60"/><float name="nearClip" value="2"/>

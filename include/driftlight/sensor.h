@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "driftlight/frame.h"
+#include "driftlight/reconstruction_filter.h"
 
 namespace driftlight {
 
@@ -17,8 +18,10 @@ struct PerspectiveCamera {
   Vec3d forward{0, 0, 1};  ///< unit
   double half_width = 1;   ///< of the image plane: tan(fov_x / 2)
   double half_height = 1;
+  Vec2d center{0, 0};  ///< of the image plane's window, along right and up: where films are cropped
   int film_width = 256;  ///< pixels
   int film_height = 256;
+  ReconstructionFilter filter;
   double near_clip = 0;  ///< depth along `forward` before which nothing is seen
   double far_clip = std::numeric_limits<double>::infinity();
 
@@ -32,8 +35,8 @@ struct PerspectiveCamera {
   template <Scalar T>
   Vec3<T> direction(const Vec2<T>& film) const {
     return unit<T>(constant<T>(forward) +
-                   T((2.0 * film.x() - 1.0) * half_width) * constant<T>(right) +
-                   T((1.0 - 2.0 * film.y()) * half_height) * constant<T>(up));
+                   T((2.0 * film.x() - 1.0) * half_width + center.x()) * constant<T>(right) +
+                   T((1.0 - 2.0 * film.y()) * half_height + center.y()) * constant<T>(up));
   }
   Vec3d direction(const Vec2d& film) const { return direction<double>(film); }
 
@@ -47,8 +50,8 @@ struct PerspectiveCamera {
   template <Scalar T>
   Vec2<T> film_position(const Vec3<T>& v) const {
     const T inverse = constant<T>(0.5) / cosine(v);
-    return {dot(right, v) * inverse * (1.0 / half_width) + 0.5,
-            0.5 - dot(up, v) * inverse * (1.0 / half_height)};
+    return {(dot(right, v) * inverse - 0.5 * center.x()) * (1.0 / half_width) + 0.5,
+            0.5 - (dot(up, v) * inverse - 0.5 * center.y()) * (1.0 / half_height)};
   }
 
   /// True if v goes through the film.

@@ -16,47 +16,94 @@ namespace {
 struct FilmSize {
   int width = 768;
   int height = 576;
+  ReconstructionFilter filter;
+  /// In pixels, from the top left.
+  struct Crop {
+    int x = 0;
+    int y = 0;
+    int width = 0;
+    int height = 0;
+  } crop;
 };
 
-/// Films are seen through the box filter here; what another filter would do differently is to blur
-/// the image by a pixel or so.
-void read_filter(Properties& film, LoadContext& context) {
-  constexpr std::string_view kBox = "pixels are means over their squares (filter 'box')";
-  const std::vector<Element> filters = film.nested({"rfilter"});
-  if (filters.size() > 1) filters.back().fail("a second rfilter of the film");
-  if (filters.empty()) {
-    context.notice(film.element(),
-                   fmt::format("without an rfilter Mitsuba takes 'gaussian'; here {}", kBox));
-    return;
-  }
-  Properties filter(filters[0]);
-  constexpr std::array<std::pair<std::string_view, bool>, 6> kFilters{{{"box", true},
-                                                                       {"tent", false},
-                                                                       {"gaussian", false},
-                                                                       {"mitchell", false},
-                                                                       {"catmullrom", false},
-                                                                       {"lanczos", false}}};
-  const bool is_box = find_plugin(kFilters, filter);
-  const bool is_pixel = filter.positive("radius", 0.5) == 0.5;
-  filter.ignore({"stddev", "B", "C", "lobes"});
-  filter.finish();
-  if (!is_box || !is_pixel)
-    context.notice(filters[0], fmt::format("{} is not used: {}", filter.description(), kBox));
+using Kind = ReconstructionFilter::Kind;
+
+/// The radius that follows from a property, if films can do that.
+double checked_radius(Properties& filter, std::string_view property, double radius) {
+  if (!(radius >= ReconstructionFilter::kMinimumRadius &&
+        radius <= ReconstructionFilter::kMaximumRadius))
+    filter.fail(
+        property,
+        fmt::format("makes a filter of radius {:g}; it must be between {:g} and {:g}", radius,
+                    ReconstructionFilter::kMinimumRadius, ReconstructionFilter::kMaximumRadius));
+  return radius;
 }
 
-void reject_crop(Properties& film, const FilmSize& size) {
-  const auto require = [&](std::string_view name, int value) {
-    if (film.integer(name, value) != value) film.fail(name, "crop windows are not supported");
+ReconstructionFilter read_box(Properties& filter) {
+  return {Kind::Box, checked_radius(filter, "radius", filter.positive("radius", 0.5))};
+}
+ReconstructionFilter read_tent(Properties& filter) {
+  return {Kind::Tent, checked_radius(filter, "radius", filter.positive("radius", 1.0))};
+}
+/// As far as four standard deviations.
+ReconstructionFilter read_gaussian(Properties& filter) {
+  const double sigma = filter.positive("stddev", 0.5);
+  return {Kind::Gaussian, checked_radius(filter, "stddev", 4.0 * sigma), sigma};
+}
+ReconstructionFilter read_mitchell(Properties& filter) {
+  ReconstructionFilter result{Kind::Cubic, 2.0};
+  result.b = filter.number("B", result.b);
+  result.c = filter.number("C", result.c);
+  return result;
+}
+ReconstructionFilter read_catmull_rom(Properties&) {
+  ReconstructionFilter result{Kind::Cubic, 2.0};
+  result.b = 0.0;
+  result.c = 0.5;
+  return result;
+}
+ReconstructionFilter read_lanczos(Properties& filter) {
+  return {Kind::Lanczos, checked_radius(filter, "lobes", filter.integer("lobes", 3))};
+}
+
+/// Mitsuba's default is the Gaussian.
+ReconstructionFilter read_filter(Properties& film) {
+  const std::vector<Element> filters = film.nested({"rfilter"});
+  if (filters.size() > 1) filters.back().fail("a second rfilter of the film");
+  if (filters.empty()) return {Kind::Gaussian, 2.0};
+  Properties filter(filters[0]);
+  using Reader = ReconstructionFilter (*)(Properties&);
+  constexpr std::array<std::pair<std::string_view, Reader>, 6> kFilters{
+      {{"box", &read_box},
+       {"tent", &read_tent},
+       {"gaussian", &read_gaussian},
+       {"mitchell", &read_mitchell},
+       {"catmullrom", &read_catmull_rom},
+       {"lanczos", &read_lanczos}}};
+  const ReconstructionFilter result = find_plugin(kFilters, filter)(filter);
+  filter.finish();
+  return result;
+}
+
+/// The window of the film that is rendered; the camera's angles are those of the whole film.
+void read_crop(Properties& film, FilmSize& size) {
+  FilmSize::Crop& crop = size.crop;
+  crop.x = film.integer("cropOffsetX", 0);
+  crop.y = film.integer("cropOffsetY", 0);
+  crop.width = film.integer("cropWidth", size.width);
+  crop.height = film.integer("cropHeight", size.height);
+  const auto require = [&](std::string_view name, int offset, int extent, int whole) {
+    if (offset < 0 || extent <= 0 || extent > whole - offset)
+      film.fail(name, fmt::format("makes a window from pixel {} to {} of a film of {}", offset,
+                                  std::int64_t{offset} + extent, whole));
   };
-  require("cropOffsetX", 0);
-  require("cropOffsetY", 0);
-  require("cropWidth", size.width);
-  require("cropHeight", size.height);
+  require(film.has("cropWidth") ? "cropWidth" : "cropOffsetX", crop.x, crop.width, size.width);
+  require(film.has("cropHeight") ? "cropHeight" : "cropOffsetY", crop.y, crop.height, size.height);
 }
 
 FilmSize read_size(Properties& film) {
   constexpr std::int64_t kMaximumPixels = std::int64_t{1} << 28;
-  const FilmSize size{film.integer("width", 768), film.integer("height", 576)};
+  const FilmSize size{film.integer("width", 768), film.integer("height", 576), {}, {}};
   if (size.width <= 0) film.fail("width", "must be positive");
   if (size.height <= 0) film.fail("height", "must be positive");
   if (std::int64_t{size.width} * size.height > kMaximumPixels)
@@ -71,9 +118,9 @@ FilmSize read_film(const Element& element, LoadContext& context) {
   const std::array<std::pair<std::string_view, bool>, 2> kinds{
       {{"hdrfilm", false}, {"ldrfilm", true}}};
   const bool tone_mapped = find_plugin(kinds, film);
-  const FilmSize size = read_size(film);
-  reject_crop(film, size);
-  read_filter(film, context);
+  FilmSize size = read_size(film);
+  read_crop(film, size);
+  size.filter = read_filter(film);
   film.ignore({"fileFormat", "pixelFormat", "componentFormat", "channelNames", "banner",
                "attachLog", "highQualityEdges", "filename", "sampleBorder", "compensate"});
   if (tone_mapped) {
@@ -132,6 +179,20 @@ void place(PerspectiveCamera& camera, Properties& sensor) {
   camera.forward = axes.col(2).normalized();
 }
 
+/// Narrows the camera from the whole film to its window.
+void crop(PerspectiveCamera& camera, const FilmSize& film) {
+  const FilmSize::Crop& window = film.crop;
+  camera.film_width = window.width;
+  camera.film_height = window.height;
+  if (window.width == film.width && window.height == film.height) return;
+  const double width = 2.0 * camera.half_width / film.width;  // of a pixel
+  const double height = 2.0 * camera.half_height / film.height;
+  camera.center.x() = (window.x + 0.5 * (window.width - film.width)) * width;
+  camera.center.y() = -(window.y + 0.5 * (window.height - film.height)) * height;
+  camera.half_width = 0.5 * window.width * width;
+  camera.half_height = 0.5 * window.height * height;
+}
+
 void reject_shift(Properties& sensor) {
   for (const std::string_view name : {"principalPointOffsetX", "principalPointOffsetY"})
     if (sensor.number(name, 0.0) != 0.0) sensor.fail(name, "shifted lenses are not supported");
@@ -151,10 +212,10 @@ PerspectiveCamera read_perspective(Properties& sensor, LoadContext& context) {
   const double aspect = static_cast<double>(film.width) / film.height;
   PerspectiveCamera camera;
   place(camera, sensor);
-  camera.film_width = film.width;
-  camera.film_height = film.height;
+  camera.filter = film.filter;
   camera.half_width = read_half_width(sensor, aspect);
   camera.half_height = camera.half_width / aspect;
+  crop(camera, film);
   camera.near_clip = sensor.positive("nearClip", 1e-2);
   camera.far_clip = sensor.positive("farClip", 1e4);
   if (!(camera.near_clip < camera.far_clip))

@@ -297,7 +297,7 @@ Scene coated(bool with_point) {
                   make.one_sided(RoughPlastic(beckmann(0.2), kGlass, textured(8, 0.1, 0.8),
                                               textured(4, 0.4, 1), true)));
   make->add_shape(round_mesh({0.3, 0.5, -0.2}, 0.5, 8),
-                  make.one_sided(RoughPlastic(ggx(0.25), kGlass, gray(0.4), gray(1.0), false)));
+                  make.one_sided(RoughPlastic(ggx(0.25), kGlass, gray(0.08), gray(1.0), false)));
   const Texture tint = textured(8, 0.5, 1.0);
   make->add_shape(quad({-1.7, 0.1, 1.0}, {1.0, 0, 0.3}, {0, 1.2, 0}, true, 0.1),
                   make.one_sided(ThinDielectric{kGlass, tint, tint}));
