@@ -118,6 +118,7 @@ struct ActiveNumbers {
   std::array<int, kMaxDimension> indices{};
   int count = 0;
 
+  int operator[](int c) const { return indices[static_cast<std::size_t>(c)]; }
   void add_pair(int i) {
     indices[static_cast<std::size_t>(count++)] = i;
     indices[static_cast<std::size_t>(count++)] = i + 1;
@@ -147,7 +148,7 @@ ActiveNumbers active_numbers(const Scene& scene, const PrimaryPath& path) {
 template <int N>
 int column_of(const ActiveNumbers& active, int first, int i) {
   for (int c = 0; c < N && first + c < active.count; ++c)
-    if (active.indices[static_cast<std::size_t>(first + c)] == i) return c;
+    if (active[first + c] == i) return c;
   return -1;
 }
 
@@ -274,7 +275,7 @@ bool PrimaryFunction::gradient(const StrategyNumbers& numbers, const PrimaryPath
     };
     const T y = log_target_of<T>(scene_, guide_, numbers, path, u);
     for (int c = 0; c < kPass && first + c < active.count; ++c)
-      result.gradient[active.indices[static_cast<std::size_t>(first + c)]] = y.v[c];
+      result.gradient[active[first + c]] = y.v[c];
   }
   return result.gradient.allFinite();
 }
@@ -300,10 +301,10 @@ bool PrimaryFunction::gradient_and_hessian(const StrategyNumbers& numbers, const
       };
       const T y = log_target_of<T>(scene_, guide_, numbers, path, u);
       for (int r = 0; r < kWidth && outer + r < active.count; ++r) {
-        const int i = active.indices[static_cast<std::size_t>(outer + r)];
+        const int i = active[outer + r];
         result.gradient[i] = y.v[r].a;
         for (int c = 0; c < kWidth && inner + c < active.count; ++c) {
-          const int j = active.indices[static_cast<std::size_t>(inner + c)];
+          const int j = active[inner + c];
           result.hessian(i, j) = y.v[r].v[c];
           result.hessian(j, i) = y.v[r].v[c];
         }

@@ -203,16 +203,16 @@ RTCRay embree_ray(const Vec3d& origin, const Vec3d& direction, double t_min, dou
 // ---- Extents of shapes ----------------------------------------------------------------------
 
 /// Area, centroid and covariance of the uniform distribution on a surface.
-struct Moments {
+struct ShapeMoments {
   double area = 0;
   Vec3d mean = Vec3d::Zero();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 
 /// A triangle has E[p p^T] = (s s^T + sum_i p_i p_i^T) / 12 with s = p_0 + p_1 + p_2.
-Moments moments(const TriangleMesh& mesh) {
+ShapeMoments moments(const TriangleMesh& mesh) {
   const Vec3d origin = mesh.positions.front().cast<double>();
-  Moments m;
+  ShapeMoments m;
   Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
   for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
     const std::array<Vec3d, 3> p = corners(mesh, i);
@@ -234,17 +234,17 @@ Moments moments(const TriangleMesh& mesh) {
   return m;
 }
 
-Moments moments(const Sphere& sphere) {
+ShapeMoments moments(const Sphere& sphere) {
   const double r2 = sphere.radius * sphere.radius;
   return {4.0 * kPi * r2, sphere.center, Eigen::Matrix3d::Identity() * (r2 / 3.0)};
 }
 
-Moments moments(const Disk& disk) {
+ShapeMoments moments(const Disk& disk) {
   return {kPi * disk.u.cross(disk.v).norm(), disk.center,
           0.25 * (disk.u * disk.u.transpose() + disk.v * disk.v.transpose())};
 }
 
-Moments moments(const Cylinder& cylinder) {
+ShapeMoments moments(const Cylinder& cylinder) {
   const Vec3d axis = cylinder.axis();
   const double across2 = 0.5 * cylinder.radius * cylinder.radius;
   const double along2 = cylinder.length * cylinder.length / 12.0;
@@ -254,7 +254,7 @@ Moments moments(const Cylinder& cylinder) {
 }
 
 ShapeExtent extent_of(const Geometry& geometry) {
-  const Moments m = std::visit([](const auto& shape) { return moments(shape); }, geometry);
+  const ShapeMoments m = std::visit([](const auto& shape) { return moments(shape); }, geometry);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(m.covariance);
   const Vec3d variance = axes.eigenvalues().cwiseMax(0.0);
   ShapeExtent extent;

@@ -92,7 +92,7 @@ struct Plastic {
   Texture specular_reflectance{Rgbd{1, 1, 1}};
   DiffuseBase base;
 
-  Plastic(double eta, const Texture& diffuse, const Texture& specular, bool nonlinear);
+  Plastic(double index, const Texture& diffuse, const Texture& specular, bool nonlinear);
 };
 
 /// Diffuse base under a rough coat, F D G / (4 cos_i cos_o) and T of RoughTransmittance.
@@ -103,7 +103,7 @@ struct RoughPlastic {
   DiffuseBase base;
   RoughTransmittance transmittance;
 
-  RoughPlastic(const Microfacets& microfacets, double eta, const Texture& diffuse,
+  RoughPlastic(const Microfacets& facets, double index, const Texture& diffuse,
                const Texture& specular, bool nonlinear);
 };
 

@@ -84,7 +84,7 @@ struct Microfacets {
     const Vec3<T> second = tilted ? unit(to_top) : tangent_basis(v).b;
     const Vec3<T> first = second.cross(v);
     const T s = 0.5 * (1.0 + v.z());
-    const T t1 = disk.x();
+    const T& t1 = disk.x();
     const T t2 = (1.0 - s) * root_or_zero(T(1.0 - t1 * t1)) + s * disk.y();
     const T t3 = root_or_zero(T(1.0 - t1 * t1 - t2 * t2));
     const Vec3<T> h = t1 * first + t2 * second + t3 * v;
