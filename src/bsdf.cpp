@@ -1,21 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "driftlight/bsdf.h"
 
+#include <boost/math/quadrature/gauss_kronrod.hpp>
+
 #include "bsdf_warp.h"
 
 namespace driftlight {
 namespace {
 
-/// 2 int F cos d cos, by Simpson's rule.
+/// 2 int F cos d cos
 double diffuse_fresnel(double eta) {
-  constexpr int kSteps = 512;
-  double sum = 0.0;
-  for (int i = 0; i <= kSteps; ++i) {
-    const double weight = i == 0 || i == kSteps ? 1.0 : i % 2 == 1 ? 4.0 : 2.0;
-    const double cosine = static_cast<double>(i) / kSteps;
-    sum += weight * cosine * fresnel_dielectric(cosine, eta);
-  }
-  return 2.0 * sum / (3.0 * kSteps);
+  return boost::math::quadrature::gauss_kronrod<double, 31>::integrate(
+      [&](double cosine) { return 2.0 * cosine * fresnel_dielectric(cosine, eta); }, 0.0, 1.0);
 }
 
 }  // namespace
@@ -77,8 +73,7 @@ double delta_eta(const Bsdf& bsdf) {
 
 std::optional<BsdfSample> sample(const Bsdf& bsdf, const SurfacePoint<double>& at, const Vec3d& wi,
                                  const Vec3d& u) {
-  const auto next = warp<double>(bsdf, at, wi, u);
-  return next ? std::optional(BsdfSample{next->wo, next->scattering, next->delta}) : std::nullopt;
+  return warp<double>(bsdf, at, wi, u);
 }
 
 double pdf(const Bsdf& bsdf, const SurfacePoint<double>& at, const Vec3d& wi, const Vec3d& wo) {

@@ -14,17 +14,10 @@
 
 namespace driftlight {
 
-template <Scalar T>
-struct WarpedDirection {
-  Vec3<T> wo;
-  Scattering scattering;
-  bool delta = false;  ///< by a delta lobe
-};
-
 /// `sample`: wo from three numbers in [0, 1), of which the last chooses the lobe.
 template <Scalar T>
-std::optional<WarpedDirection<T>> warp(const Bsdf& bsdf, const SurfacePoint<T>& at,
-                                       const Vec3<T>& wi, const Vec3<T>& u);
+std::optional<BsdfSampleOf<T>> warp(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                                    const Vec3<T>& u);
 
 /// `pdf`, with derivatives.
 template <Scalar T>
@@ -40,13 +33,13 @@ T delta_probability_of(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T
 namespace detail {
 
 template <Scalar T>
-using Warped = std::optional<WarpedDirection<T>>;
+using Warped = std::optional<BsdfSampleOf<T>>;
 
 /// A sample that leaves on the wrong side is lost; its mass is missing from the pdf's integral.
 template <Scalar T>
 Warped<T> reflected(const Vec3<T>& wo, const Vec3<T>& wi, const Vec3<T>& n) {
   if (value(n).dot(value(wo)) * value(n).dot(value(wi)) <= 0.0) return std::nullopt;
-  return WarpedDirection<T>{wo, Scattering::Reflection};
+  return BsdfSampleOf<T>{wo, Scattering::Reflection};
 }
 
 template <Scalar T>
@@ -72,7 +65,7 @@ template <Scalar T>
 Warped<T> warp_bsdf(const Conductor&, const SurfacePoint<T>& at, const Vec3<T>& wi,
                     const Vec3<T>&) {
   if (value(at.n).dot(value(wi)) <= 0.0) return std::nullopt;
-  return WarpedDirection<T>{reflect(wi, at.n), Scattering::Reflection, true};
+  return BsdfSampleOf<T>{reflect(wi, at.n), Scattering::Reflection, true};
 }
 
 template <Scalar T>
@@ -104,9 +97,9 @@ Warped<T> warp_bsdf(const Dielectric& b, const SurfacePoint<T>& at, const Vec3<T
                     const Vec3<T>& u) {
   const double cos_i = value(at.n).dot(value(wi));
   if (value(u.z()) < interface_reflectance(b.eta, cos_i))
-    return WarpedDirection<T>{reflect(wi, at.n), Scattering::Reflection, true};
-  return WarpedDirection<T>{refract(wi, at.n, cos_i > 0.0 ? b.eta : 1.0 / b.eta),
-                            Scattering::Transmission, true};
+    return BsdfSampleOf<T>{reflect(wi, at.n), Scattering::Reflection, true};
+  return BsdfSampleOf<T>{refract(wi, at.n, cos_i > 0.0 ? b.eta : 1.0 / b.eta),
+                         Scattering::Transmission, true};
 }
 
 template <Scalar T>
@@ -128,7 +121,7 @@ Warped<T> warp_bsdf(const RoughDielectric& b, const SurfacePoint<T>& at, const V
   if (value(u.z()) < fresnel_dielectric(ih, eta)) return reflected<T>(reflect(wi, h), wi, n);
   const Vec3<T> wo = refract(wi, h, eta);
   if (value(n).dot(value(wo)) >= 0.0) return std::nullopt;
-  return WarpedDirection<T>{wo, Scattering::Transmission};
+  return BsdfSampleOf<T>{wo, Scattering::Transmission};
 }
 
 /// reflection p(h) F / (4 wi.h); transmission p(h) (1 - F) e^2 |wo.h| / (wi.h + e wo.h)^2
@@ -230,7 +223,7 @@ Warped<T> warp_bsdf(const Plastic& b, const SurfacePoint<T>& at, const Vec3<T>& 
   const double cos_i = value(at.n).dot(value(wi));
   if (cos_i <= 0.0) return std::nullopt;
   if (takes_coat(b, at, cos_i, u.z()))
-    return WarpedDirection<T>{reflect(wi, at.n), Scattering::Reflection, true};
+    return BsdfSampleOf<T>{reflect(wi, at.n), Scattering::Reflection, true};
   return reflected<T>(warp_diffuse(at.n, u), wi, at.n);
 }
 
@@ -276,8 +269,8 @@ Warped<T> warp_bsdf(const ThinDielectric& b, const SurfacePoint<T>& at, const Ve
                     const Vec3<T>& u) {
   const double r = fresnel_dielectric(std::abs(value(at.n).dot(value(wi))), b.eta);
   if (value(u.z()) < 2.0 * r / (1.0 + r))
-    return WarpedDirection<T>{reflect(wi, at.n), Scattering::Reflection, true};
-  return WarpedDirection<T>{-wi, Scattering::Transmission, true};
+    return BsdfSampleOf<T>{reflect(wi, at.n), Scattering::Reflection, true};
+  return BsdfSampleOf<T>{-wi, Scattering::Transmission, true};
 }
 
 template <Scalar T>
@@ -296,7 +289,7 @@ T nested_probability(const Mask& b, const Vec2<T>& uv) {
 template <Scalar T>
 Warped<T> warp_bsdf(const Mask& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& u) {
   const double p = nested_probability<double>(b, {value(at.uv.x()), value(at.uv.y())});
-  if (!(value(u.z()) < p)) return WarpedDirection<T>{-wi, Scattering::Transmission, true};
+  if (!(value(u.z()) < p)) return BsdfSampleOf<T>{-wi, Scattering::Transmission, true};
   if (b.nested == nullptr) return std::nullopt;
   return warp<T>(b.nested->bsdf, at, wi, Vec3<T>(u.x(), u.y(), constant<T>(value(u.z()) / p)));
 }
@@ -348,8 +341,8 @@ T probability_of_delta(const B&, const SurfacePoint<T>&, const Vec3<T>&, Scatter
 }  // namespace detail
 
 template <Scalar T>
-std::optional<WarpedDirection<T>> warp(const Bsdf& bsdf, const SurfacePoint<T>& at,
-                                       const Vec3<T>& wi, const Vec3<T>& u) {
+std::optional<BsdfSampleOf<T>> warp(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                                    const Vec3<T>& u) {
   return std::visit([&](const auto& b) { return detail::warp_bsdf<T>(b, at, wi, u); }, bsdf);
 }
 

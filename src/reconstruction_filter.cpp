@@ -2,6 +2,7 @@
 #include "driftlight/reconstruction_filter.h"
 
 #include <algorithm>
+#include <boost/math/quadrature/gauss.hpp>
 
 namespace driftlight {
 namespace {
@@ -56,20 +57,15 @@ double ReconstructionFilter::operator()(double x) const {
   return 0.0;
 }
 
-/// Simpson's rule between multiples of a quarter of the radius, where the pieces of tents and
+/// Piece by piece between multiples of a quarter of the radius, where the pieces of tents and
 /// cubics meet.
 double ReconstructionFilter::integral(double from, double to) const {
-  constexpr int kSteps = 64;
   double sum = 0.0;
   for (int piece = -4; piece < 4; ++piece) {
     const double a = std::max(from, 0.25 * radius * piece);
     const double b_end = std::min(to, 0.25 * radius * (piece + 1));
     if (!(a < b_end)) continue;
-    const double step = (b_end - a) / kSteps;
-    for (int i = 0; i <= kSteps; ++i) {
-      const double weight = i == 0 || i == kSteps ? 1.0 : i % 2 == 1 ? 4.0 : 2.0;
-      sum += weight * step / 3.0 * (*this)(std::clamp(a + i * step, -radius, radius));
-    }
+    sum += boost::math::quadrature::gauss<double, 30>::integrate(*this, a, b_end);
   }
   return sum;
 }

@@ -2,6 +2,7 @@
 #include "driftlight/rough_transmittance.h"
 
 #include <algorithm>
+#include <boost/math/quadrature/gauss_kronrod.hpp>
 #include <cmath>
 
 #include "driftlight/fresnel.h"
@@ -63,16 +64,9 @@ RoughTransmittance::Cubic RoughTransmittance::cubic(double cosine) const {
           static_cast<double>(cell)};
 }
 
-/// Simpson's rule.
 double RoughTransmittance::diffuse() const {
-  double sum = 0.0;
-  const auto f = [&](double cosine) { return 2.0 * cosine * eval(cosine); };
-  for (int i = 0; i < kCells; ++i) {
-    const double a = static_cast<double>(i) / kCells;
-    const double b = (i + 1.0) / kCells;
-    sum += (f(a) + 4.0 * f(0.5 * (a + b)) + f(b)) / (6.0 * kCells);
-  }
-  return sum;
+  return boost::math::quadrature::gauss_kronrod<double, 31>::integrate(
+      [&](double cosine) { return 2.0 * cosine * eval(cosine); }, 0.0, 1.0);
 }
 
 }  // namespace driftlight

@@ -180,11 +180,13 @@ template <Scalar T>
 ScaledColor<T> eval_delta(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& wi,
                           Scattering scattering);
 
-struct BsdfSample {
-  Vec3d wo;
+template <Scalar T>
+struct BsdfSampleOf {
+  Vec3<T> wo;
   Scattering scattering;
   bool delta = false;  ///< by a delta lobe
 };
+using BsdfSample = BsdfSampleOf<double>;
 
 /// Draws wo from three numbers in [0, 1). None where the BSDF sends nothing.
 std::optional<BsdfSample> sample(const Bsdf& bsdf, const SurfacePoint<double>& at, const Vec3d& wi,
