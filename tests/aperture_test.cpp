@@ -7,7 +7,6 @@
 
 #include <Eigen/LU>
 #include <cmath>
-#include <filesystem>
 #include <optional>
 #include <vector>
 
@@ -15,6 +14,7 @@
 #include "driftlight/scene_file.h"
 #include "driftlight/small_step.h"
 #include "driftlight/walk.h"
+#include "support/places.h"
 #include "support/test_scenes.h"
 
 namespace driftlight::test {
@@ -231,9 +231,7 @@ TEST(Aperture, RowsAreDerivatives) {
   EXPECT_GT(compared, 400);
 }
 
-LoadedScene small_hole() {
-  return load_scene(std::filesystem::path(DRIFTLIGHT_SCENE_DIR) / "small_hole.xml");
-}
+LoadedScene small_hole() { return load_scene(test::own_scene("small_hole")); }
 
 // Law: the step of a state is a function of the state: whatever was found before, a path has the
 // same apertures and the same density, to the last bit; and the option makes the difference.

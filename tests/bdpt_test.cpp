@@ -6,13 +6,13 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "driftlight/error.h"
 #include "driftlight/render.h"
 #include "driftlight/scene_file.h"
+#include "support/places.h"
 #include "support/t_test.h"
 #include "support/test_scenes.h"
 
@@ -100,7 +100,7 @@ TEST(LightTracing, ClosedFurnace) {
 LoadedScene load_small(const std::string& name) {
   LoadOptions options;
   options.defines = {{"width", "48"}, {"height", "40"}};
-  return load_scene(std::filesystem::path(DRIFTLIGHT_SCENE_DIR) / (name + ".xml"), options);
+  return load_scene(test::own_scene(name), options);
 }
 
 bool same_bits(const std::vector<float>& a, const std::vector<float>& b) {

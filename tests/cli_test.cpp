@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "driftlight/image.h"
+#include "support/places.h"
 #include "support/process.h"
 #include "support/scene_directory.h"
 
@@ -77,7 +78,7 @@ class Cli : public ::testing::Test {
   }
 
   static std::vector<std::string> command(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), DRIFTLIGHT_CLI);
+    arguments.insert(arguments.begin(), test::program());
     return arguments;
   }
   Outcome run(const std::vector<std::string>& arguments) const {

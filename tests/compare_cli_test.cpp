@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "driftlight/image.h"
+#include "support/places.h"
 #include "support/process.h"
 #include "support/scene_directory.h"
 
@@ -77,7 +78,7 @@ class CompareCli : public ::testing::Test {
   }
 
   Outcome run(std::vector<std::string> arguments) const {
-    arguments.insert(arguments.begin(), DRIFTLIGHT_CLI);
+    arguments.insert(arguments.begin(), test::program());
     test::Process process(arguments, folder(), directory_.path());
     const int exit_code = process.exit_code();
     return {exit_code, process.standard_output(), process.standard_error()};
@@ -406,7 +407,7 @@ TEST_F(CompareCli, FillsAnEmptyFolder) {
 }
 
 TEST_F(CompareCli, ASignalKeepsCompleteRoundsOrNothing) {
-  test::Process early({DRIFTLIGHT_CLI, "compare", "scene.xml", "--out", "out", "--integrators",
+  test::Process early({test::program(), "compare", "scene.xml", "--out", "out", "--integrators",
                        "path", "--time", "3600"},
                       folder(), scratch(), test::Process::Stderr::Terminal);
   ASSERT_TRUE(early.wait_for(" left", std::chrono::seconds(60))) << early.standard_error();
@@ -415,7 +416,7 @@ TEST_F(CompareCli, ASignalKeepsCompleteRoundsOrNothing) {
   EXPECT_TRUE(contains(early.standard_error(), "nothing is written")) << early.standard_error();
   EXPECT_EQ(files(), (std::set<std::string>{"scene.xml"}));
 
-  test::Process late({DRIFTLIGHT_CLI, "compare", "scene.xml", "--out", "out", "--integrators",
+  test::Process late({test::program(), "compare", "scene.xml", "--out", "out", "--integrators",
                       "path", "--time", "0.1", "--runs", "100"},
                      folder(), scratch(), test::Process::Stderr::Terminal);
   ASSERT_TRUE(late.wait_for(" 50 %", std::chrono::seconds(60))) << late.standard_error();

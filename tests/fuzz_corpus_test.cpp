@@ -11,6 +11,7 @@
 #include "scene_file/mesh_obj.h"
 #include "scene_file/mesh_ply.h"
 #include "scene_file/mesh_serialized.h"
+#include "support/places.h"
 
 namespace driftlight {
 namespace {
@@ -20,8 +21,7 @@ using Reader = std::function<void(const std::filesystem::path&)>;
 /// Reads all files of a corpus; returns how many of them are good.
 int read_corpus(const std::string& name, const Reader& read) {
   int good = 0;
-  for (const auto& entry :
-       std::filesystem::directory_iterator(std::filesystem::path(DRIFTLIGHT_FUZZ_CORPUS) / name)) {
+  for (const auto& entry : std::filesystem::directory_iterator(test::fuzz_corpus() / name)) {
     try {
       read(entry.path());
       ++good;

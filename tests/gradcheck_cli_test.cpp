@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "support/places.h"
 #include "support/process.h"
 #include "support/scene_directory.h"
 
@@ -121,7 +122,7 @@ class GradcheckCli : public ::testing::Test {
   }
 
   Outcome run(std::vector<std::string> arguments) const {
-    arguments.insert(arguments.begin(), DRIFTLIGHT_CLI);
+    arguments.insert(arguments.begin(), test::program());
     test::Process process(arguments, folder(), directory_.path());
     const int exit_code = process.exit_code();
     return {exit_code, process.standard_output(), process.standard_error()};

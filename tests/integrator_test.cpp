@@ -15,6 +15,7 @@
 #include "driftlight/image.h"
 #include "driftlight/render.h"
 #include "driftlight/scene_file.h"
+#include "support/places.h"
 #include "support/t_test.h"
 #include "support/test_scenes.h"
 #include "support/tiles.h"
@@ -150,7 +151,7 @@ class SharedReference : public testing::Test {
   static constexpr int kBlock = 16;
 
   void load(const std::string& name) {
-    const std::filesystem::path shared(DRIFTLIGHT_SHARED_DIR);
+    const std::filesystem::path shared = test::shared_folder();
     const auto file = shared / "scenes" / name / "scene.xml";
     const auto reference = shared / "references" / (name + ".exr");
     if (!std::filesystem::exists(file) || !std::filesystem::exists(reference))

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "support/places.h"
 #include "support/process.h"
 #include "support/scene_directory.h"
 
@@ -44,7 +45,7 @@ class LayersCli : public ::testing::Test {
     std::string err;
   };
   Outcome render(const std::vector<std::string>& arguments) const {
-    std::vector<std::string> command{DRIFTLIGHT_CLI, "render", "scene.xml"};
+    std::vector<std::string> command{test::program(), "render", "scene.xml"};
     command.insert(command.end(), arguments.begin(), arguments.end());
     test::Process process(command, folder(), directory_.path());
     const int exit_code = process.exit_code();

@@ -7,7 +7,6 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <filesystem>
 #include <limits>
 #include <vector>
 
@@ -16,6 +15,7 @@
 #include "driftlight/factor.h"
 #include "driftlight/scene_file.h"
 #include "support/path_classes.h"
+#include "support/places.h"
 #include "support/test_scenes.h"
 
 namespace driftlight::test {
@@ -279,7 +279,7 @@ TEST(DerivativeMethod, SameMutationsInTheRoom) {
 }
 
 TEST(DerivativeMethod, SameMutationsInTheGlossyScene) {
-  const auto file = std::filesystem::path(DRIFTLIGHT_SCENE_DIR) / "glossy_chain.xml";
+  const auto file = test::own_scene("glossy_chain");
   const LoadedScene loaded = load_scene(file);
   EXPECT_GT(TwinChains(loaded.scene, 12).free_run(kMutations), 500);
   expect_same_mutations(loaded.scene, 12);

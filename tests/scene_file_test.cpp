@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "support/places.h"
 #include "support/scene_directory.h"
 
 namespace driftlight {
@@ -232,11 +233,10 @@ TEST(SensorXml, KnowsFocalLengths) {
 
 // --- Scenes of others ----------------------------------------------------------------------------
 
-#ifdef DRIFTLIGHT_SHARED_DIR
 class SharedScene : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(SharedScene, LoadsUnchanged) {
-  const auto file = std::filesystem::path(DRIFTLIGHT_SHARED_DIR) / "scenes" / GetParam();
+  const auto file = test::shared_folder() / "scenes" / GetParam();
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not on this machine";
   const LoadedScene loaded = load_scene(file);
   EXPECT_GE(loaded.scene.shapes().size(), 5U);
@@ -247,7 +247,6 @@ TEST_P(SharedScene, LoadsUnchanged) {
 INSTANTIATE_TEST_SUITE_P(All, SharedScene,
                          ::testing::Values("cbox/scene.xml", "cbox_glossy/scene.xml",
                                            "torus/scene.xml", "torus/lmc.xml"));
-#endif
 
 }  // namespace
 }  // namespace driftlight

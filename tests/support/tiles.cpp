@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <filesystem>
 
+#include "support/places.h"
 #include "support/test_scenes.h"
 
 namespace driftlight::test {
@@ -19,7 +19,7 @@ LoadedScene load_small(const std::string& name, const std::map<std::string, std:
   LoadOptions options;
   options.defines = {{"width", "32"}, {"height", "24"}};
   options.defines.insert(defines.begin(), defines.end());
-  return load_scene(std::filesystem::path(DRIFTLIGHT_SCENE_DIR) / (name + ".xml"), options);
+  return load_scene(own_scene(name), options);
 }
 
 std::vector<double> tile_means(const Image& image) {
