@@ -138,19 +138,18 @@ class RedistributionSampler {
 
   /// min(w, tau) / w; keeps the path as a start if that is below 1.
   double share_of_sample(const Vec2d& film, const Rgbd& value, const FoundPath& path) {
-    const double tau = common_.remainder.tau();
     // By balance weights the value is f / q.
     const double w = luminance(value) / (path.roulette * common_.pilot.brightness(film));
-    if (!(w > tau)) return 1.0;
+    if (!(w > common_.remainder.tau())) return 1.0;
     const auto sample = state_of(common_.scene, path, common_.options.phase_space);
     if (!sample) return 1.0;
     Start start{sample->topology, sample->coordinates,
                 contribution(common_.scene, sample->topology, sample->coordinates), Share{}, 0.0};
     start.share = common_.remainder.share(start.topology, start.coordinates, start.contribution);
     if (!std::isfinite(start.share.log_remainder)) return 1.0;
-    start.remainder = path.roulette * (start.share.w - tau);
+    start.remainder = path.roulette * start.share.excess();
     if (!common_.splitting.takes(start.topology)) starts_.push_back(start);
-    return tau / start.share.w;
+    return start.share.tau / start.share.w;
   }
 
   /// Chains of mutations that deposit epsilon each; if they would be too many, then longer ones,

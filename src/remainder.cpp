@@ -10,6 +10,8 @@ namespace {
 
 /// Brighter paths are left to the samples: chains sum in fixed point.
 constexpr double kMostW = 1e9;
+/// tau of emitters that are seen directly, over that of other light.
+constexpr double kSeenTau = 16;
 
 }  // namespace
 
@@ -25,9 +27,10 @@ Share Remainder::share(const PathTopology& topology, const PathCoordinates& coor
   share.film = contribution.film;
   share.brightness = brightness_(share.film);
   share.w = std::exp(contribution.log_target - std::log(q * share.brightness));
-  const bool remains = share.w > tau_ && share.w < kMostW && std::isfinite(q);
+  share.tau = n > 1 ? tau_ : kSeenTau * tau_;
+  const bool remains = share.w < kMostW && std::isfinite(q);
   share.log_remainder =
-      remains ? std::log(q) + std::log(share.w - tau_) : -std::numeric_limits<double>::infinity();
+      remains ? std::log(q) + std::log(share.excess()) : -std::numeric_limits<double>::infinity();
   return share;
 }
 

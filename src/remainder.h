@@ -7,8 +7,13 @@
 /// Samples carry the first part; their weights are bounded by tau in units of m. The chains target
 /// the remainder over m, pi = q (w - tau)_+, and deposit m times what they visit. Any m > 0 is
 /// right; this one spreads the work, and the noise, over the image in proportion to its brightness.
+///
+/// Emitters that are seen directly have a higher tau. Samples find a large one with the same weight
+/// all over, and to spread that would only add noise. The edge of a tiny one, far brighter than
+/// what is around it, is still left to chains.
 #pragma once
 
+#include <algorithm>
 #include <utility>
 
 #include "brightness_map.h"
@@ -20,9 +25,13 @@ namespace driftlight {
 /// How a path is shared.
 struct Share {
   double w = 0;                ///< f / (q m)
+  double tau = 0;              ///< for paths of its length
   double log_remainder = 0;    ///< log pi; -infinity where nothing is left
   double brightness = 0;       ///< m
   Vec2d film = Vec2d::Zero();  ///< where the path is seen
+
+  /// (w - tau)_+
+  double excess() const { return std::max(0.0, w - tau); }
 };
 
 class Remainder {
@@ -32,6 +41,7 @@ class Remainder {
             double tau)
       : scene_(scene), guide_(guide), brightness_(brightness), tau_(tau) {}
 
+  /// The least tau.
   double tau() const { return tau_; }
   /// Of a path with light. A path so bright that sums might overflow, or whose density is not
   /// finite, has no remainder: samples carry it whole.

@@ -66,7 +66,6 @@ struct PilotRun {
 struct Setup {
   const Splitter& splitter;
   const PerspectiveCamera& camera;
-  double tau;
   std::uint64_t seed;
 
   int pixel(const Vec2d& film) const {
@@ -94,7 +93,7 @@ PilotRun run_task(const Setup& pilot, const SplittingPlan& plan, std::uint64_t f
           family[sequence] += amount;
           pixels[pixel] += amount;
           alone[{particle, pixel}] += amount;
-          result.noise[sequence].remainder += amount * (share.w - pilot.tau);
+          result.noise[sequence].remainder += amount * share.excess();
         });
     for (const auto& [sequence, sum] : family) result.noise[sequence].families += sum * sum;
     for (const auto& [pixel, sum] : pixels) result.pixels += sum * sum;
@@ -159,7 +158,7 @@ double set_effort(const PilotRun& run, double samples, int last_steps, Splitting
 
 SplittingPlan plan_splitting(TemperedScenes& scenes, const Splitter& prototype,
                              const LangevinOptions& options, std::uint64_t seed) {
-  const Setup pilot{prototype, scenes[0].camera(), options.redistribution.threshold, seed};
+  const Setup pilot{prototype, scenes[0].camera(), seed};
   const auto tasks = static_cast<std::uint64_t>(options.splitting.pilot) / kTask;
   const std::uint64_t samples = std::max<std::uint64_t>(1, tasks) * kTask;
   const auto count = static_cast<double>(samples);

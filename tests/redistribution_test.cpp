@@ -126,5 +126,12 @@ TEST(Redistribution, LeavesNothingAboveAHighThreshold) {
   EXPECT_GT(result.statistics.b, 0.0);
 }
 
+/// An emitter as bright as what is around it has w = 1; where it is seen, tau is 16 times as high.
+TEST(Redistribution, LeavesWhatIsSeenDirectlyToSamples) {
+  const Scene glow = furnace(0.0);
+  EXPECT_EQ(render_small(glow, 2, 1.0 / 15.0).statistics.mutations, 0U);
+  EXPECT_GT(render_small(glow, 2, 0.001).statistics.mutations, 0U);
+}
+
 }  // namespace
 }  // namespace driftlight::test
