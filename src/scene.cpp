@@ -432,7 +432,7 @@ void SceneBuilder::set_environment(Emitter environment) {
   scene_.emitters_.push_back(std::move(environment));
 }
 
-void SceneBuilder::set_camera(const PerspectiveCamera& camera) { scene_.camera_ = camera; }
+void SceneBuilder::set_camera(const Camera& camera) { scene_.camera_ = camera; }
 
 Scene SceneBuilder::build() {
   Scene& scene = scene_;

@@ -65,7 +65,7 @@ struct PilotRun {
 /// A pilot's splitter with what it is to do.
 struct Setup {
   const Splitter& splitter;
-  const PerspectiveCamera& camera;
+  const Camera& camera;
   double tau;
   std::uint64_t seed;
 

@@ -47,7 +47,7 @@ Scene frosted() {
   builder.add_shape(test::round_mesh({0.1, 0.3, 1.0}, 0.25, 4), white);
   builder.set_environment(
       EnvironmentMap(test::sun_bitmap(32, 16, 60.0F), Eigen::Matrix3d::Identity(), 1.0));
-  PerspectiveCamera camera = test::look_at({0.3, 1.6, 3.0}, {0, 0.4, 0}, 0.5);
+  Camera camera = test::look_at({0.3, 1.6, 3.0}, {0, 0.4, 0}, 0.5);
   camera.half_height = 0.375;
   camera.film_width = 32;
   camera.film_height = 24;

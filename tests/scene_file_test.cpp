@@ -25,7 +25,7 @@ std::string sensor(const std::string& properties, int width = 200, int height = 
          R"(<rfilter type="box"/></film></sensor>)";
 }
 
-PerspectiveCamera load_camera(const std::string& properties, int width = 200, int height = 100) {
+Camera load_camera(const std::string& properties, int width = 200, int height = 100) {
   const SceneDirectory directory;
   const std::string text = scene_file(sensor(properties, width, height) + kEmitter + kShape);
   return directory.load(text).scene.camera();
@@ -123,7 +123,7 @@ TEST(SceneFile, KeepsTheDepthOfForeignBlocks) {
 // --- The sensor ----------------------------------------------------------------------------------
 
 TEST(SensorXml, LooksAlongZWithXOnTheLeft) {
-  const PerspectiveCamera camera = load_camera(R"(<float name="fov" value="60"/>)");
+  const Camera camera = load_camera(R"(<float name="fov" value="60"/>)");
   expect_near(camera.right, Vec3d(-1, 0, 0));
   expect_near(camera.up, Vec3d(0, 1, 0));
   expect_near(camera.forward, Vec3d(0, 0, 1));
@@ -141,8 +141,8 @@ TEST(SensorXml, CropsTheFilm) {
         crop + R"(<rfilter type="box"/></film></sensor>)";
     return directory.load(scene_file(sensor + kEmitter + kShape)).scene.camera();
   };
-  const PerspectiveCamera whole = load("");
-  const PerspectiveCamera part = load(
+  const Camera whole = load("");
+  const Camera part = load(
       R"(<integer name="cropOffsetX" value="12"/><integer name="cropOffsetY" value="4"/>
          <integer name="cropWidth" value="20"/><integer name="cropHeight" value="6"/>)");
   EXPECT_EQ(part.film_width, 20);
@@ -189,7 +189,7 @@ TEST(SensorXml, ReadsFilters) {
 }
 
 TEST(SensorXml, LooksAtItsTarget) {
-  const PerspectiveCamera camera = load_camera(
+  const Camera camera = load_camera(
       R"(<float name="fov" value="60"/><float name="nearClip" value="2"/>
          <float name="farClip" value="50"/><float name="focusDistance" value="7"/>
          <transform name="toWorld">
@@ -216,13 +216,13 @@ TEST(SensorXml, MeasuresTheFieldOfViewAlongItsAxis) {
   EXPECT_NEAR(camera("smaller", 100, 200).half_width, half, 1e-12);
   EXPECT_NEAR(camera("larger", 200, 100).half_width, half, 1e-12);
   EXPECT_NEAR(camera("larger", 100, 200).half_height, half, 1e-12);
-  const PerspectiveCamera diagonal = camera("diagonal", 200, 100);
+  const Camera diagonal = camera("diagonal", 200, 100);
   EXPECT_NEAR(std::hypot(diagonal.half_width, diagonal.half_height), half, 1e-12);
 }
 
 TEST(SensorXml, KnowsFocalLengths) {
   const auto diagonal = [](const std::string& properties) {
-    const PerspectiveCamera camera = load_camera(properties);
+    const Camera camera = load_camera(properties);
     return std::hypot(camera.half_width, camera.half_height);
   };
   const double film = std::hypot(36.0, 24.0);

@@ -21,7 +21,7 @@ class ConstraintVisitor : public WalkVisitor<T> {
   explicit ConstraintVisitor(Sink& sink) : sink_(sink) {}
 
   /// Film position: uniform on the film, half side / sqrt(3); 1 / sqrt(12) in film coordinates.
-  void sensor(const PerspectiveCamera& camera, const Vec3<T>& v) {
+  void sensor(const Camera& camera, const Vec3<T>& v) {
     const Vec2<T> film = camera.film_position(v);
     const S precision = constant<S>(12.0);
     sink_.add(film.x(), precision);

@@ -42,6 +42,8 @@
 ///   sphere           dn = dx' / R                                                        (H16)
 /// Ends:
 ///   camera           log W = -3 log(forward.v):  -3 forward / forward.v . dv             (H17)
+///   orthographic     dx of Camera::origin_differential, and no dv of the ray; a connection to it has
+///                    dw = 0 and the constant W / spread                                  (H33)
 ///   connection       w = e / r, e = y - x:  dw = (I - w w^T) de / r, d log r^2 = 2 w.de / r
 ///                    log cos_y, cos_y = -n_y.w:  d = -(n_y.dw + w.dn_y) / cos_y          (H18)
 ///   spot             log falloff(-w):  -(d falloff / dv)(-w) / falloff . dw              (H23)
@@ -596,8 +598,13 @@ struct HandRules {
   // ---- Ends ----
 
   /// (H17): gradient of log W by v.
-  static Vec3d camera(const PerspectiveCamera& camera, const Vec3d& v) {
+  static Vec3d camera(const Camera& camera, const Vec3d& v) {
     return -3.0 / camera.cosine(v) * camera.forward;
+  }
+
+  /// (H33): the derivative by v, from that by the origin of its ray.
+  static Vec3d parallel_camera(const Camera& camera, const Vec3d& v, const Vec3d& x_bar) {
+    return camera.origin_adjoint(v, x_bar);
   }
 
   /// (H18): the transpose of (I - w w^T) / r at w_bar, plus the gradient of -log r^2, by e.

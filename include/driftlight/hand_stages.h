@@ -121,8 +121,16 @@ class StageSweep : RecordedPath<Rules> {
 
   void begin_at_sensor() {
     film(block_columns());
-    close(Stage::Kind::Free, true);
-    take_direction();
+    const Camera& camera = scene_.camera();
+    if (!camera.is_orthographic()) {
+      close(Stage::Kind::Free, true);
+      take_direction();
+      return;
+    }
+    close(Stage::Kind::Point, true);
+    ray_.xi_t = camera.origin_differential(path_.v0, chart_.block(block_).t);
+    ray_.xi_b = camera.origin_differential(path_.v0, chart_.block(block_).b);
+    ++block_;
   }
 
   Arrival arrive(const Vertex& x) const {
@@ -217,6 +225,17 @@ class StageSweep : RecordedPath<Rules> {
   /// Both ends of the joining edge, whose columns are those of both sides: (H18).
   void join(const Arrival& x, const Arrival& y) {
     const Vertex& at = this->light_end();
+    if (path_.count == 0 && scene_.camera().is_orthographic()) {
+      // dv of the coordinate: (I - v v^T) dx / (a |v / (forward.v)|) of what is across the rays.
+      const Vec3d& v = path_.v0;
+      const Vec3d& forward = scene_.camera().forward;
+      const Columns across = y.dx - outer(forward, dot(forward, y.dx));
+      film(scene_.camera().cosine(v) / scene_.camera().scale *
+           (across - outer(v, dot(v, across))));
+      position(*at.shape, y.dx);
+      residuals(at, y.dwi, Columns::zero(), y.dn);
+      return;
+    }
     const Vec3d w = -at.wo;
     const double r = (at.p - this->sensor_end()).norm();
     const Columns de = y.dx - x.dx;
@@ -282,7 +301,7 @@ class StageSweep : RecordedPath<Rules> {
 
   /// (H22)
   void film(const Columns& dv) {
-    const PerspectiveCamera& camera = scene_.camera();
+    const Camera& camera = scene_.camera();
     const Vec3d& v = path_.v0;
     const double f = camera.cosine(v);
     const double factor = std::sqrt(12.0) / 3.0;

@@ -50,7 +50,8 @@ struct Stage {
     Free,      ///< takes a block of coordinates, and is followed by another stage
     Delta,     ///< no block of its own; followed by another stage
     Terminal,  ///< the last one, with a block (an emitter point) or without
-    Point,     ///< the first of a light side: its block is xi of the next
+    Point,     ///< the first of a light side or at an orthographic sensor: its block is xi of the
+               ///< next
   };
   using Map = Eigen::Matrix<double, 2, 4, Eigen::RowMajor>;
 

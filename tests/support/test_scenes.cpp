@@ -66,8 +66,8 @@ TriangleMesh box(const Vec3d& low, const Vec3d& high) {
   return mesh;
 }
 
-PerspectiveCamera look_at(const Vec3d& origin, const Vec3d& target, double half_width) {
-  PerspectiveCamera camera;
+Camera look_at(const Vec3d& origin, const Vec3d& target, double half_width) {
+  Camera camera;
   camera.origin = origin;
   camera.forward = (target - origin).normalized();
   camera.right = camera.forward.cross(Vec3d::UnitY()).normalized();
@@ -320,7 +320,7 @@ Scene coated(bool with_point) {
   make->add_shape(quad({-0.9, 2.8, -0.6}, {1.8, 0, 0}, {0, 0, 1.4}), black, Rgbd{4, 4, 4});
   make->add_shape(round_mesh({-1.4, 1.9, -0.5}, 0.35, 4, false), black, Rgbd{6, 7, 8});
   if (with_point) make->add_emitter(PointEmitter{{1.3, 2.4, 1.2}, {3, 3, 2.5}});
-  PerspectiveCamera camera = look_at({0, 1.4, 3.6}, {0, 0.9, 0}, 0.5);
+  Camera camera = look_at({0, 1.4, 3.6}, {0, 0.9, 0}, 0.5);
   camera.half_height = 0.375;
   camera.film_width = 32;
   camera.film_height = 24;

@@ -46,7 +46,7 @@ TriangleMesh round_mesh(const Vec3d& center, double radius, int rings, bool norm
 TriangleMesh box(const Vec3d& low, const Vec3d& high);
 
 /// A camera at `origin` that looks at `target`, y up, with this tangent of half its field of view.
-PerspectiveCamera look_at(const Vec3d& origin, const Vec3d& target, double half_width);
+Camera look_at(const Vec3d& origin, const Vec3d& target, double half_width);
 
 /// A smooth coloured pattern in [low, high].
 std::shared_ptr<const Bitmap> pattern_bitmap(int width, int height, double low, double high);
