@@ -137,8 +137,8 @@ class TwoSidedTracer {
   TraceStatus join() const {
     const Vec3d& p = light_end_->at.p;
     const Camera& camera = scene_.camera();
-    const Vec3d edge = camera_end_ ? Vec3d(p - camera_end_->at.p)
-                                   : camera.ray(camera.coordinate(p)).direction;
+    const Vec3d edge =
+        camera_end_ ? Vec3d(p - camera_end_->at.p) : camera.ray(camera.coordinate(p)).direction;
     const TraceStatus at_light = scatters(pattern_.camera_count(), *light_end_, -edge);
     if (at_light != TraceStatus::Ok) return at_light;
     const Vec3d to = scene_.leave(p, light_end_->at.n_g, -edge);
@@ -156,7 +156,8 @@ class TwoSidedTracer {
     if (!camera.sees(v)) return TraceStatus::Missed;
     const double depth = camera.depth(light_end_->at.p);
     if (!(depth > camera.near_clip && depth < camera.far_clip)) return TraceStatus::Missed;
-    return scene_.occluded(to, camera.at_near_plane(camera.ray(v))) ? TraceStatus::Occluded : TraceStatus::Ok;
+    return scene_.occluded(to, camera.at_near_plane(camera.ray(v))) ? TraceStatus::Occluded
+                                                                    : TraceStatus::Ok;
   }
 
   const Scene& scene_;

@@ -48,8 +48,8 @@ Rgbd scattered(const SurfaceHit& x, const Vec3d& wi, const Vec3d& wo) {
   return color_of(eval(*x.bsdf, x.surface(), wi, wo));
 }
 
-/// v is uniform over the film: its density is the importance W(v), by area across parallel rays that
-/// over Camera::spread. No strategy gives up the sensor.
+/// v is uniform over the film: its density is the importance W(v), by area across parallel rays
+/// that over Camera::spread. No strategy gives up the sensor.
 Departure SubpathTracer::leave_sensor(const Vec3d& v) const {
   const Camera& camera = scene_.camera();
   const Ray<double> ray = camera.ray(v);

@@ -33,6 +33,10 @@ Texture bitmap_texture(double low, double high) {
   return texture;
 }
 
+std::shared_ptr<const BsdfBox> boxed(Bsdf bsdf) {
+  return std::make_shared<const BsdfBox>(BsdfBox{std::move(bsdf)});
+}
+
 /// White BSDFs that scatter into a density, smooth to rough.
 std::vector<Named> scattering_bsdfs() {
   std::vector<Named> result;
@@ -58,11 +62,14 @@ std::vector<Named> scattering_bsdfs() {
         {"rough plastic", RoughPlastic({Distribution::Ggx, 0.3}, 1.5, kWhite, kWhite, nonlinear)});
   result.push_back({"rough plastic 0.05", RoughPlastic({Distribution::Beckmann, 0.05}, 1.5,
                                                        bitmap_texture(0.2, 0.8), kWhite, true)});
+  const Texture weight = bitmap_texture(0.1, 0.9);
+  const auto metal = boxed(RoughConductor{{Distribution::Beckmann, 0.2}});
+  result.push_back({"blend of diffuse and metal", Blend{weight, boxed(Diffuse{kWhite}), metal}});
+  result.push_back(
+      {"blend of rough glass, diffuse and metal",
+       Blend{half, boxed(RoughDielectric{{Distribution::Ggx, 0.3}, 1.5, kWhite, kWhite}),
+             boxed(Blend{weight, boxed(Diffuse{kWhite}), metal})}});
   return result;
-}
-
-std::shared_ptr<const BsdfBox> boxed(Bsdf bsdf) {
-  return std::make_shared<const BsdfBox>(BsdfBox{std::move(bsdf)});
 }
 
 /// White BSDFs with delta lobes and, the first ones, a density beside them. Their `sample` loses
@@ -76,8 +83,17 @@ std::vector<Named> mixed_bsdfs() {
   result.push_back({"masked diffuse", Mask{holes, boxed(Diffuse{kWhite})}});
   result.push_back({"masked plastic", Mask{half, boxed(Plastic(1.5, kWhite, kWhite, false))}});
   result.push_back({"masked mask", Mask{half, boxed(Mask{holes, boxed(Diffuse{kWhite})})}});
+  result.push_back({"blend of plastic and mirror",
+                    Blend{bitmap_texture(0.1, 0.9), boxed(Plastic(1.5, kWhite, kWhite, true)),
+                          boxed(Conductor{})}});
   result.push_back({"thin dielectric", ThinDielectric{1.5, kWhite, kWhite}});
   result.push_back({"masked thin", Mask{half, boxed(ThinDielectric{1.5, kWhite, kWhite})}});
+  const Texture weight = bitmap_texture(0.1, 0.9);
+  const auto glass = boxed(Dielectric{1.5, kWhite, kWhite});
+  result.push_back({"blend of glass", Blend{half, glass, glass}});
+  result.push_back(
+      {"blend of pane and null", Blend{weight, boxed(ThinDielectric{1.5, kWhite, kWhite}),
+                                       boxed(Mask{Texture(Rgbd::Zero()), nullptr})}});
   result.push_back({"masked mirror", Mask{holes, boxed(Conductor{})}});
   result.push_back({"null", Mask{Texture(Rgbd::Zero()), nullptr}});
   return result;

@@ -32,9 +32,9 @@ struct Recorder : WalkVisitor<double> {
   Vec3d sensor_origin;
   bool want_gradient;
   std::array<Vertex, kMaxPathLength> vertices;
-  int count = 0;  ///< of vertices; of those on the sensor's side where there is another
-  Vec3d v0;         ///< the coordinate of the first ray
-  Vec3d departure;  ///< its direction
+  int count = 0;             ///< of vertices; of those on the sensor's side where there is another
+  Vec3d v0;                  ///< the coordinate of the first ray
+  Vec3d departure;           ///< its direction
   Vec3d end;                 ///< where the path meets its emitter
   Vec3d last_v;              ///< the direction into the environment
   double connection_cosine;  ///< of the emitter's normal
@@ -184,7 +184,8 @@ class RecordedPath {
   const BlurredAreaEmitter* blurred() const { return std::get_if<BlurredAreaEmitter>(&emitter()); }
   /// The ray that leaves the last vertex.
   Ray<double> last_ray() const {
-    return {path_.origin(path_.count), path_.count == 0 ? path_.departure : vertex(path_.count - 1).wo};
+    return {path_.origin(path_.count),
+            path_.count == 0 ? path_.departure : vertex(path_.count - 1).wo};
   }
   Vec3d connection_point() const {
     return topology_.end == PathEnd::AreaConnection ? path_.end : position_of(emitter());

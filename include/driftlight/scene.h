@@ -144,6 +144,7 @@ class Scene {
 /// Collects the parts of a scene. Indices are returned in order from 0.
 class SceneBuilder {
  public:
+  /// Throws InputError if it has more than kMaxLobes lobes.
   std::uint32_t add_bsdf(Bsdf bsdf);
   std::uint32_t add_material(const Material& material);
   /// With `radiance` the shape is an area emitter. Throws InputError on an empty mesh or one whose

@@ -10,11 +10,11 @@
 
 namespace driftlight {
 
-/// A camera: its film, and the ray through each film point. Film coordinates (x, y) run over [0, 1)^2
-/// from the top left corner of the image.
+/// A camera: its film, and the ray through each film point. Film coordinates (x, y) run over [0,
+/// 1)^2 from the top left corner of the image.
 ///
-/// Each ray has a unit vector v as its coordinate, which names the point v / (forward.v) of an image
-/// plane at distance 1. With a = `scale` it is
+/// Each ray has a unit vector v as its coordinate, which names the point v / (forward.v) of an
+/// image plane at distance 1. With a = `scale` it is
 ///   Perspective   the ray from `origin` along v,
 ///   Orthographic  the ray along `forward` from origin + a (v / (forward.v) - forward),
 /// so that the film, W(v), charts and constraints are the same for both: in the measure of v.
@@ -29,7 +29,9 @@ struct Camera {
   double half_width = 1;   ///< of the image plane; of a pinhole tan(fov_x / 2)
   double half_height = 1;
   double scale = 1;  ///< Orthographic: length in the world of a unit of the image plane
-  Vec2d center{0, 0};  ///< of the image plane's window, along right and up: films that are cropped or shifted
+  Vec2d center{
+      0,
+      0};  ///< of the image plane's window, along right and up: films that are cropped or shifted
   int film_width = 256;  ///< pixels
   int film_height = 256;
   ReconstructionFilter filter;
@@ -69,8 +71,8 @@ struct Camera {
     return unit<T>(along(edge, T(scale - cosine(edge)), constant<T>(forward)));
   }
 
-  /// Area across the rays at p by solid angle of the coordinate v of the ray there: squared distance
-  /// of a pinhole; a^2 / (forward.v)^3.
+  /// Area across the rays at p by solid angle of the coordinate v of the ray there: squared
+  /// distance of a pinhole; a^2 / (forward.v)^3.
   template <Scalar T>
   T spread(const Vec3<T>& v, const Vec3<T>& p) const {
     if (!is_orthographic()) {

@@ -38,7 +38,8 @@ struct WalkVisitor {
   /// The ray that leaves the sensor or a vertex, for a visitor that changes its derivatives (never
   /// its value). `normal` is the geometric one of the surface left; the optical axis at the sensor.
   void depart(Ray<T>& /*ray*/, const Vec3<T>& /*normal*/) {}
-  /// In the place of `depart` at an orthographic sensor: coordinates move the origin of the ray alone.
+  /// In the place of `depart` at an orthographic sensor: coordinates move the origin of the ray
+  /// alone.
   void depart_parallel(Ray<T>& /*ray*/) {}
   /// Scattering into the edge that connects to an emitter point.
   void connect(const ScatterEvent<T>&) {}

@@ -167,8 +167,8 @@ double read_half_width(Properties& sensor, double aspect) {
   return axis == "y" ? half * aspect : half;
 }
 
-/// Mitsuba's cameras look along +z with +y up, which leaves +x on the left of the image. Returns the
-/// lengths of these axes in the world.
+/// Mitsuba's cameras look along +z with +y up, which leaves +x on the left of the image. Returns
+/// the lengths of these axes in the world.
 Vec3d place(Camera& camera, Properties& sensor) {
   const Eigen::Affine3d to_world = sensor.transform("toWorld");
   const Eigen::Matrix3d axes = to_world.linear();
