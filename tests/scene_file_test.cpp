@@ -188,6 +188,43 @@ TEST(SensorXml, ReadsFilters) {
          2.0);
 }
 
+// Law: with an offset each film point shows what is beside it without, also where it is cropped.
+TEST(SensorXml, ShiftsTheFilm) {
+  const std::string fov = R"(<float name="fov" value="70"/>)";
+  const Camera plain = load_camera(fov);
+  const Camera shifted = load_camera(fov + R"(<float name="principalPointOffsetX" value="0.25"/>
+                                             <float name="principalPointOffsetY" value="-0.1"/>)");
+  for (const Vec2d& film : {Vec2d(0.5, 0.5), Vec2d(0.1, 0.8)}) {
+    const Vec3d v = shifted.direction(film);
+    expect_near(v, plain.direction(Vec2d(film + Vec2d(0.25, -0.1))));
+    EXPECT_LT((shifted.film_position(v) - film).norm(), 1e-12);
+  }
+}
+
+// Law: an orthographic sensor sees [-1, 1] across, scaled by its transform, and as high as its
+// aspect wants.
+TEST(SensorXml, ReadsOrthographicSensors) {
+  const auto load = [](const std::string& to_world, int width, int height) {
+    const SceneDirectory directory;
+    const std::string sensor = R"(<sensor type="orthographic"><transform name="toWorld">)" +
+                               to_world +
+                               R"(</transform><film type="hdrfilm"><integer name="width" value=")" +
+                               std::to_string(width) + R"("/><integer name="height" value=")" +
+                               std::to_string(height) + R"("/></film></sensor>)";
+    return directory.load(scene_file(sensor + kEmitter + kShape)).scene.camera();
+  };
+  const Camera camera = load(R"(<scale x="10" y="5"/><lookat origin="1, 2, 3" target="1, 2, -5"
+                                up="0, 1, 0"/>)",
+                             200, 100);
+  EXPECT_TRUE(camera.is_orthographic());
+  for (const Vec2d& film : {Vec2d(0.5, 0.5), Vec2d(0.0, 0.0), Vec2d(1.0, 0.25)}) {
+    const Ray<double> ray = camera.ray<double>(camera.direction(film));
+    expect_near(ray.direction, Vec3d(0, 0, -1));
+    expect_near(ray.origin, Vec3d(1 + 10 * (2 * film.x() - 1), 2 + 2.5 * (1 - 2 * film.y()), 3));
+  }
+  EXPECT_NEAR(camera.area() * camera.scale * camera.scale, 20.0 * 5.0, 1e-9);
+}
+
 TEST(SensorXml, LooksAtItsTarget) {
   const Camera camera = load_camera(
       R"(<float name="fov" value="60"/><float name="nearClip" value="2"/>
