@@ -19,6 +19,7 @@ struct Segment {
   Vec3d end_normal;  ///< of the surface it ends on; v where that has none
   double length;
   bool determined = false;  ///< by a delta lobe
+  bool parallel = false;    ///< of an orthographic sensor: its block moves `from` alone
 };
 
 /// Records the segments of a path without a light side.
@@ -35,6 +36,11 @@ class SegmentRecorder : public WalkVisitor<double> {
     segments_[static_cast<std::size_t>(count_ - 1)].determined = delta_;
     delta_ = false;
   }
+  void depart_parallel(const Ray<double>& ray) {
+    begin(ray.origin, ray.direction, ray.direction);
+    segments_[static_cast<std::size_t>(count_ - 1)].parallel = true;
+  }
+  const Camera& camera() const { return scene_.camera(); }
   void scatter(const ScatterEvent<double>& e) { end(e.at.p, e.at.n_g); }
   void delta(const ScatterEvent<double>& e) {
     end(e.at.p, e.at.n_g);
@@ -73,6 +79,7 @@ class SegmentRecorder : public WalkVisitor<double> {
     segment.normal = normal;
     segment.v = v;
     segment.determined = false;
+    segment.parallel = false;
   }
   void end(const Vec3d& p, const Vec3d& normal) {
     const Segment& segment = segments_[static_cast<std::size_t>(count_ - 1)];
@@ -299,6 +306,13 @@ class ApertureRows {
     const Segment& segment = segments_[k];
     const TangentBasis plane = tangent_basis(segment.normal);
     LocalRow row = LocalRow::Zero();
+    if (segment.parallel) {
+      const Chart::Block& block = chart_.block(0);
+      const Camera& camera = segments_.camera();
+      row[kSensorColumns.xi] = a.dot(camera.origin_differential(block.point, block.t));
+      row[kSensorColumns.xi + 1] = a.dot(camera.origin_differential(block.point, block.b));
+      return row;
+    }
     row[kSensorColumns.xi] = a.dot(plane.t);
     row[kSensorColumns.xi + 1] = a.dot(plane.b);
     if (segment.determined) {

@@ -135,26 +135,29 @@ class TwoSidedTracer {
   }
 
   TraceStatus join() const {
-    const Vec3d& from = camera_end_ ? camera_end_->at.p : scene_.camera().origin;
-    const Vec3d edge = light_end_->at.p - from;
+    const Vec3d& p = light_end_->at.p;
+    const Camera& camera = scene_.camera();
+    const Vec3d edge =
+        camera_end_ ? Vec3d(p - camera_end_->at.p) : camera.ray(camera.coordinate(p)).direction;
     const TraceStatus at_light = scatters(pattern_.camera_count(), *light_end_, -edge);
     if (at_light != TraceStatus::Ok) return at_light;
-    const Vec3d to = scene_.leave(light_end_->at.p, light_end_->at.n_g, -edge);
-    if (!camera_end_) return join_sensor(edge.normalized(), to);
+    const Vec3d to = scene_.leave(p, light_end_->at.n_g, -edge);
+    if (!camera_end_) return join_sensor(to);
     const TraceStatus at_camera = scatters(pattern_.camera_count() - 1, *camera_end_, edge);
     if (at_camera != TraceStatus::Ok) return at_camera;
-    const Vec3d start = scene_.leave(from, camera_end_->at.n_g, edge);
+    const Vec3d start = scene_.leave(camera_end_->at.p, camera_end_->at.n_g, edge);
     return scene_.occluded(start, to) ? TraceStatus::Occluded : TraceStatus::Ok;
   }
 
   /// What lies before the near plane hides nothing.
-  TraceStatus join_sensor(const Vec3d& v, const Vec3d& to) const {
-    const PerspectiveCamera& camera = scene_.camera();
+  TraceStatus join_sensor(const Vec3d& to) const {
+    const Camera& camera = scene_.camera();
+    const Vec3d v = camera.coordinate(light_end_->at.p);
     if (!camera.sees(v)) return TraceStatus::Missed;
-    const double depth = camera.cosine(Vec3d(light_end_->at.p - camera.origin));
+    const double depth = camera.depth(light_end_->at.p);
     if (!(depth > camera.near_clip && depth < camera.far_clip)) return TraceStatus::Missed;
-    const Vec3d front = camera.origin + camera.near_clip / camera.cosine(v) * v;
-    return scene_.occluded(to, front) ? TraceStatus::Occluded : TraceStatus::Ok;
+    return scene_.occluded(to, camera.at_near_plane(camera.ray(v))) ? TraceStatus::Occluded
+                                                                    : TraceStatus::Ok;
   }
 
   const Scene& scene_;

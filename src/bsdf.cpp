@@ -35,6 +35,8 @@ RoughPlastic::RoughPlastic(const Microfacets& facets, double index, const Textur
 }
 
 bool is_delta(const Bsdf& bsdf) {
+  if (const auto* blend = std::get_if<Blend>(&bsdf))
+    return is_delta(blend->first->bsdf) && is_delta(blend->second->bsdf);
   if (const auto* mask = std::get_if<Mask>(&bsdf))
     return mask->nested == nullptr || is_delta(mask->nested->bsdf);
   return std::holds_alternative<Conductor>(bsdf) || std::holds_alternative<Dielectric>(bsdf) ||
@@ -42,6 +44,8 @@ bool is_delta(const Bsdf& bsdf) {
 }
 
 bool has_delta(const Bsdf& bsdf, Scattering scattering) {
+  if (const auto* blend = std::get_if<Blend>(&bsdf))
+    return has_delta(blend->first->bsdf, scattering) || has_delta(blend->second->bsdf, scattering);
   if (std::holds_alternative<Dielectric>(bsdf) || std::holds_alternative<ThinDielectric>(bsdf))
     return true;
   if (const auto* mask = std::get_if<Mask>(&bsdf))
@@ -53,6 +57,8 @@ bool has_delta(const Bsdf& bsdf, Scattering scattering) {
 }
 
 bool is_transmissive(const Bsdf& bsdf) {
+  if (const auto* blend = std::get_if<Blend>(&bsdf))
+    return is_transmissive(blend->first->bsdf) || is_transmissive(blend->second->bsdf);
   if (const auto* mask = std::get_if<Mask>(&bsdf))
     return mask->nested == nullptr || is_transmissive(mask->nested->bsdf);
   return std::holds_alternative<Dielectric>(bsdf) ||
@@ -61,12 +67,30 @@ bool is_transmissive(const Bsdf& bsdf) {
 }
 
 bool is_diffuse(const Bsdf& bsdf) {
+  if (const auto* blend = std::get_if<Blend>(&bsdf)) {
+    const Bsdf& a = blend->first->bsdf;
+    const Bsdf& b = blend->second->bsdf;
+    return !is_delta(bsdf) && (is_delta(a) || is_diffuse(a)) && (is_delta(b) || is_diffuse(b));
+  }
   if (const auto* mask = std::get_if<Mask>(&bsdf))
     return mask->nested != nullptr && is_diffuse(mask->nested->bsdf);
   return std::holds_alternative<Diffuse>(bsdf) || std::holds_alternative<Plastic>(bsdf);
 }
 
+int lobe_count(const Bsdf& bsdf) {
+  if (const auto* blend = std::get_if<Blend>(&bsdf))
+    return lobe_count(blend->first->bsdf) + lobe_count(blend->second->bsdf);
+  if (const auto* mask = std::get_if<Mask>(&bsdf))
+    return mask->nested == nullptr ? 0 : lobe_count(mask->nested->bsdf);
+  if (is_delta(bsdf)) return 0;
+  return std::holds_alternative<Phong>(bsdf) || std::holds_alternative<RoughPlastic>(bsdf) ? 2 : 1;
+}
+
 double delta_eta(const Bsdf& bsdf) {
+  if (const auto* blend = std::get_if<Blend>(&bsdf)) {
+    const bool of_first = has_delta(blend->first->bsdf, Scattering::Transmission);
+    return delta_eta(of_first ? blend->first->bsdf : blend->second->bsdf);
+  }
   const auto* glass = std::get_if<Dielectric>(&bsdf);
   return glass != nullptr ? glass->eta : 1.0;
 }

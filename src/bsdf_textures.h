@@ -44,6 +44,11 @@ void for_each_texture(const Bsdf& bsdf, const Visit& visit) {
       visit(b.opacity);
       if (b.nested != nullptr) for_each_texture(b.nested->bsdf, visit);
     }
+    void operator()(const Blend& b) const {
+      visit(b.weight);
+      for_each_texture(b.first->bsdf, visit);
+      for_each_texture(b.second->bsdf, visit);
+    }
   };
   std::visit(Visitor{visit}, bsdf);
 }

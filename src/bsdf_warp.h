@@ -300,6 +300,25 @@ T pdf_bsdf(const Mask& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const Ve
   return nested_probability<T>(b, at.uv) * pdf_of<T>(b.nested->bsdf, at, wi, wo);
 }
 
+/// The second with probability w.
+template <Scalar T>
+Warped<T> warp_bsdf(const Blend& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                    const Vec3<T>& u) {
+  const double w = b.weight.eval<double>({value(at.uv.x()), value(at.uv.y())})[0];
+  const double choice = value(u.z());
+  const bool second = choice < w;
+  const double rest = second ? choice / w : (choice - w) / (1.0 - w);
+  return warp<T>(second ? b.second->bsdf : b.first->bsdf, at, wi,
+                 Vec3<T>(u.x(), u.y(), constant<T>(rest)));
+}
+
+template <Scalar T>
+T pdf_bsdf(const Blend& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& wo) {
+  const T w = b.weight.eval(at.uv)[0];
+  return (1.0 - w) * pdf_of<T>(b.first->bsdf, at, wi, wo) +
+         w * pdf_of<T>(b.second->bsdf, at, wi, wo);
+}
+
 template <Scalar T>
 T probability_of_delta(const Conductor&, const SurfacePoint<T>&, const Vec3<T>&,
                        Scattering scattering) {
@@ -331,6 +350,13 @@ T probability_of_delta(const Mask& b, const SurfacePoint<T>& at, const Vec3<T>& 
   const T through = scattering == Scattering::Transmission ? T(1.0 - p) : constant<T>(0.0);
   if (b.nested == nullptr) return through;
   return through + p * delta_probability_of<T>(b.nested->bsdf, at, wi, scattering);
+}
+template <Scalar T>
+T probability_of_delta(const Blend& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                       Scattering scattering) {
+  const T w = b.weight.eval(at.uv)[0];
+  return (1.0 - w) * delta_probability_of<T>(b.first->bsdf, at, wi, scattering) +
+         w * delta_probability_of<T>(b.second->bsdf, at, wi, scattering);
 }
 /// Those that have no delta lobe.
 template <Scalar T, class B>

@@ -7,7 +7,7 @@ namespace {
 struct FilmVisitor : ContributionVisitor<double> {
   Vec2d film;
 
-  void sensor(const PerspectiveCamera& camera, const Vec3d& v) {
+  void sensor(const Camera& camera, const Vec3d& v) {
     ContributionVisitor<double>::sensor(camera, v);
     film = camera.film_position(v);
   }

@@ -35,7 +35,7 @@ struct DensityVertex {
   T cosine_in;   ///< of the edge from the sensor's side
   T cosine_out;  ///< of v_k
   T etendue;     ///< of a delta lobe: n^2 cos d omega dA before it over that behind it
-  T r2;          ///< squared length of the edge from x_{k-1}
+  T r2;          ///< squared length of the edge from x_{k-1}; of x_1 Camera::spread
   bool delta;
 };
 
@@ -51,14 +51,19 @@ class DensityVisitor : public WalkVisitor<T> {
         emitter_(topology.emitter),
         scatter_count_(topology.scatter_count),
         last_(constant<T>(scene.camera().origin)),
-        before_last_(last_) {}
+        before_last_(last_),
+        v0_(last_) {}
 
-  void sensor(const PerspectiveCamera& camera, const Vec3<T>& v) {
+  void sensor(const Camera& camera, const Vec3<T>& v) {
     using std::exp;
     importance = exp(camera.log_importance(v));
+    v0_ = v;
+    at_sensor_ = true;
   }
+  void depart_parallel(Ray<T>& ray) { last_ = ray.origin; }
   void position(const Shape&, const Vec3<T>& p) {
-    r2 = squared_distance(p, last_);
+    r2 = at_sensor_ ? scene_.camera().spread(v0_, p) : squared_distance(p, last_);
+    at_sensor_ = false;
     before_last_ = last_;
     last_ = p;
   }
@@ -87,7 +92,7 @@ class DensityVisitor : public WalkVisitor<T> {
   }
   void hit(const AreaEmitter& light, const T& cosine, const T& squared) {
     using std::sqrt;
-    area_end(light, cosine, squared);
+    area_end(light, cosine, r2);
     guide_emission(last_, Vec3<T>((before_last_ - last_) / sqrt(squared)));
     measure = constant<T>(1.0);
   }
@@ -101,7 +106,9 @@ class DensityVisitor : public WalkVisitor<T> {
     const auto* map = std::get_if<EnvironmentMap>(&light);
     // Constant within a patch of the map.
     const double direction = map != nullptr ? map->pdf(value(v)) : 0.25 * kInvPi;
-    connected = constant<T>(direction);
+    // No ray of an orthographic sensor comes to a direction that was drawn.
+    const bool parallel = scatter_count_ == 0 && scene_.camera().is_orthographic();
+    connected = constant<T>(parallel ? 0.0 : direction);
     emitted = constant<T>(direction * kInvPi / (scene_.radius() * scene_.radius()));
     guide_emission(last_, Vec3<T>(-v));
   }
@@ -147,9 +154,9 @@ class DensityVisitor : public WalkVisitor<T> {
   /// All vertices are known: their distances in order from the sensor.
   void joined(const T& squared) {
     measure /= squared;
-    const Vec3<T> origin = constant<T>(scene_.camera().origin);
-    const Vec3<T>* from = &origin;
-    for (std::size_t k = 0; k < scatter_count_; ++k) {
+    vertices[0].r2 = scene_.camera().spread(v0_, vertices[0].p);
+    const Vec3<T>* from = &vertices[0].p;
+    for (std::size_t k = 1; k < scatter_count_; ++k) {
       vertices[k].r2 = squared_distance(vertices[k].p, *from);
       from = &vertices[k].p;
     }
@@ -205,6 +212,8 @@ class DensityVisitor : public WalkVisitor<T> {
   std::size_t scatter_count_;
   std::size_t index_ = 0;
   Vec3<T> last_, before_last_;  ///< of the positions visited
+  Vec3<T> v0_;                  ///< coordinate of the first ray
+  bool at_sensor_ = false;      ///< the next position is that of x_1
   std::optional<Vec3<T>> end_;  ///< the point that a light side begins at
 };
 

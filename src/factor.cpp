@@ -115,10 +115,11 @@ RiccatiFactor::RiccatiFactor(const Linearization& path)
     double a = m.u0[4] + kConstraintFloor;
     double b = m.u1[4];
     double c = m.u1[5] + kConstraintFloor;
-    if (stage.kind == Stage::Kind::Free) {
-      a += cost(2, 2);
-      b += cost(3, 2);
-      c += cost(3, 3);
+    if (stage.kind != Stage::Kind::Terminal) {
+      const int i = stage.kind == Stage::Kind::Point ? 0 : 2;  // u becomes xi or omega
+      a += cost(i, i);
+      b += cost(i + 1, i);
+      c += cost(i + 1, i + 1);
     }
     // By pivots, as Cholesky does: the inverse of Lambda would lose the digits of tight
     // constraints.
@@ -205,6 +206,7 @@ Vector RiccatiFactor::solve(const Vector& x) const {
 Eigen::Array4d RiccatiFactor::next_state(const Step& step, int k, const Row& s, double u0,
                                          double u1) {
   if (step.kind == Stage::Kind::Terminal) return s;
+  if (step.kind == Stage::Kind::Point) return {u0, u1, 0.0, 0.0};
   if (k == 0) return {0.0, 0.0, u0, u1};
   const double x0 = dot(step.position.first, s);
   const double x1 = dot(step.position.second, s);
@@ -213,7 +215,8 @@ Eigen::Array4d RiccatiFactor::next_state(const Step& step, int k, const Row& s, 
 }
 
 /// The adjoint of `solve`, run backward: with lambda the adjoint of s,
-///   v = x_b + lambda_omega,  y_b = R_b^-T v,  lambda <- A^T lambda_xi - K^T v   (free)
+///   v = x_b + lambda_omega,  y_b = R_b^-T v,  lambda <- A^T lambda_xi - K^T v   (free; a point has
+///   lambda_xi in v)
 ///   lambda <- A^T lambda_xi + D^T lambda_omega                                  (delta)
 Vector RiccatiFactor::solve_transposed(const Vector& x) const {
   Vector y(dimension_);
@@ -228,8 +231,9 @@ Vector RiccatiFactor::solve_transposed(const Vector& x) const {
       back += lambda[2] * step.direction.first + lambda[3] * step.direction.second;
     if (step.has_block) {
       --block;
-      const double v0 = x[2 * block] + lambda[2];
-      const double v1 = x[2 * block + 1] + lambda[3];
+      const int i = step.kind == Stage::Kind::Point ? 0 : 2;
+      const double v0 = x[2 * block] + lambda[i];
+      const double v1 = x[2 * block + 1] + lambda[i + 1];
       y[2 * block] = v0 * step.inverse00;
       y[2 * block + 1] = (v1 - step.r01 * y[2 * block]) * step.inverse11;
       if (k > 0) back -= v0 * step.gain.first + v1 * step.gain.second;

@@ -34,12 +34,12 @@ class LightTracer {
   }
 
  private:
-  /// Radiance that emitters send along the camera ray v.
+  /// Radiance that emitters send along the camera ray of v.
   Rgbd directly_seen(const Vec3d& v) const {
     RayFollower follower(scene_, v);
     const Hit hit = follower.next_hit();
-    const auto end =
-        hit.valid() ? light_end_at(scene_, follower.surface(hit)) : light_end_toward(scene_, v);
+    const auto end = hit.valid() ? light_end_at(scene_, follower.surface(hit))
+                                 : light_end_toward(scene_, follower.ray().direction);
     return end ? end->emitted : Rgbd::Zero();
   }
 

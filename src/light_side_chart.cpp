@@ -68,7 +68,7 @@ PathPoints points_of(const Scene& scene, const Sample& path) {
   PathPoints result;
   const PathTopology& topology = path.topology;
   if (topology.scatter_count == 0) return result;
-  Ray<double> ray{scene.camera().origin, path.coordinates(0)};
+  Ray<double> ray = scene.camera().ray(path.coordinates(0));
   int block = 1;
   for (std::size_t k = 0; k < topology.scatter_count; ++k) {
     const WalkVertex<double> x = arrive(scene, topology.vertices[k], ray);
@@ -93,7 +93,7 @@ std::optional<Sample> with_light_side(const Scene& scene, const Sample& path,
   topology.block_count = 0;
   Coordinates coordinates(points, result);
   const int camera_count = topology.camera_count();
-  if (camera_count > 0) coordinates.add_direction(scene.camera().origin, coordinates.point(0));
+  if (camera_count > 0) coordinates.add(scene.camera().coordinate(coordinates.point(0)));
   for (int k = 0; k + 1 < camera_count; ++k) coordinates.add_free(k, k + 1);
   const int first = topology.scatter_count - 1;
   if (const auto* parallel = std::get_if<DirectionalEmitter>(&emitter)) {

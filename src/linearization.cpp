@@ -96,6 +96,10 @@ Vector apply_constraints(const Linearization& path, const Vector& x) {
       residuals[i] = (path.rows.row(i) * local).sum();
     if (stage.kind == Stage::Kind::Terminal) break;
     if (stage.kind == Stage::Kind::Delta) u = stage.direction * s;
+    if (stage.kind == Stage::Kind::Point) {
+      s.head<2>() = u;
+      continue;
+    }
     if (k > 0) s.head<2>() = (stage.position * s).eval();
     s.tail<2>() = u;
   }
@@ -116,6 +120,7 @@ Vector apply_constraints(const Linearization& path, const Vector& x) {
       y[2 * block] += local[4];
       y[2 * block + 1] += local[5];
       if (stage.kind == Stage::Kind::Free) y.segment<2>(2 * block) += lambda.tail<2>();
+      if (stage.kind == Stage::Kind::Point) y.segment<2>(2 * block) += lambda.head<2>();
     }
     lambda = back;
   }

@@ -163,13 +163,16 @@ class StageVisitor : public VisitorPair<Jet, First, Second> {
     result_.sensor_stages = result_.stage_count;
   }
 
+  /// What were columns of u are those of xi from here on.
   void leave_point(Vec3<Jet>& y) {
     Stage& stage = close_stage();
     stage.kind = Stage::Kind::Point;
     stage.has_block = true;
-    const Chart::Block& block = chart_.block(block_++);
-    seed(y, columns_.xi, block.t, block.b);
+    ++block_;
+    const auto column = [&](int c) { return Vec3d(y.x().v[c], y.y().v[c], y.z().v[c]); };
+    seed(y, columns_.xi, column(columns_.u), column(columns_.u + 1));
   }
+  void depart_parallel(Ray<Jet>& ray) { leave_point(ray.origin); }
 
   void depart(Ray<Jet>& ray, const Vec3<Jet>& normal) {
     Stage& stage = close_stage();

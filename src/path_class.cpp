@@ -31,6 +31,9 @@ struct BsdfKind {
   std::string operator()(const Mask& b) const {
     return b.nested == nullptr ? "null" : "masked " + kind_of(b.nested->bsdf);
   }
+  std::string operator()(const Blend& b) const {
+    return "blend of " + kind_of(b.first->bsdf) + " and " + kind_of(b.second->bsdf);
+  }
 };
 
 /// The event of scattering at an interface: which side, and whether it is passed.
@@ -54,13 +57,21 @@ std::string lobe(const RoughPlastic& b, const ScatterEvent<double>& e) {
   return specular > diffuse ? " coat" : " base";
 }
 
+std::string lobe(const Blend& b, const ScatterEvent<double>& e) {
+  const auto shares = detail::blend_shares<double>(b, e.surface(), e.wi, e.wo);
+  return shares.second > shares.first ? ", the second" : ", the first";
+}
+
 /// The BSDF with what it does at this event.
 std::string lobe(const ScatterEvent<double>& e, bool delta) {
   const std::string kind = kind_of(e.bsdf);
   if (std::holds_alternative<Mask>(e.bsdf) && delta && e.scattering == Scattering::Transmission)
     return kind + " passed";
   if (std::holds_alternative<Plastic>(e.bsdf)) return kind + (delta ? " coat" : " base");
+  const auto* blend = std::get_if<Blend>(&e.bsdf);
+  if (blend != nullptr && delta) return kind + ", smooth" + passage(e);
   if (is_transmissive(e.bsdf)) return kind + passage(e);
+  if (blend != nullptr) return kind + lobe(*blend, e);
   if (const auto* phong = std::get_if<Phong>(&e.bsdf)) return kind + lobe(*phong, e);
   if (const auto* plastic = std::get_if<RoughPlastic>(&e.bsdf)) return kind + lobe(*plastic, e);
   return kind;

@@ -110,9 +110,10 @@ std::optional<Sample> join_in_light_chart(const Scene& scene, CameraPart& part,
                                           int light_count) {
   PathTopology& topology = part.path.topology;
   const bool to_sky = light.count == 0 && light.infinite;
-  const Vec3d& from = part.last ? part.last->at.p : scene.camera().origin;
   const Vec3d to = light.count > 0 ? light[light.count - 1].p : light.point.p;
-  const Vec3d edge = to_sky ? light.sky : Vec3d(to - from);
+  const Camera& camera = scene.camera();
+  Vec3d edge = to_sky ? light.sky : camera.ray(camera.coordinate(to)).direction;
+  if (part.last && !to_sky) edge = to - part.last->at.p;
   if (part.last) {
     if (!passes(part.last->at, part.last->wi, edge)) return std::nullopt;
     topology.vertices[topology.scatter_count - 1U].scattering = part.last->side(edge);
@@ -163,15 +164,22 @@ bool contains(const Scene& scene, const Sample& path, const LightPart& light) {
 std::optional<Sample> connect(const Scene& scene, CameraPart& part, const LightPart& light) {
   Sample& path = part.path;
   PathTopology& topology = path.topology;
-  const Vec3d& from = part.last ? part.last->at.p : scene.camera().origin;
+  const Camera& camera = scene.camera();
   const Vec3d to = light.count > 0 ? light[light.count - 1].p : light.point.p;
   const bool to_sky = light.count == 0 && light.infinite;
-  const Vec3d edge = to_sky ? light.sky : Vec3d((to - from).normalized());
+  // No ray of an orthographic sensor comes to a direction that was drawn.
+  if (to_sky && !part.last && camera.is_orthographic()) return std::nullopt;
+  Vec3d edge = light.sky;
+  Vec3d block = light.sky;
+  if (!to_sky) {
+    block = part.last ? Vec3d((to - part.last->at.p).normalized()) : camera.coordinate(to);
+    edge = part.last ? block : camera.ray(block).direction;
+  }
   if (part.last) {
     if (!passes(part.last->at, part.last->wi, edge)) return std::nullopt;
     topology.vertices[topology.scatter_count - 1U].scattering = part.last->side(edge);
   }
-  path.coordinates(topology.block_count++) = edge;
+  path.coordinates(topology.block_count++) = block;
   if (!append(light, edge, path) || !set_end(scene, light, path)) return std::nullopt;
   const PathTopology pattern = topology;
   if (trace(scene, pattern, path.coordinates, topology) != TraceStatus::Ok) return std::nullopt;

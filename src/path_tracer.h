@@ -19,7 +19,7 @@ class PathTracer {
  public:
   PathTracer(const Scene& scene, int max_depth) : scene_(scene), max_depth_(max_depth) {}
 
-  /// One estimate of the radiance along the camera ray v, by paths of at most max_depth edges.
+  /// One estimate of the radiance along the camera ray of v, by paths of at most max_depth edges.
   Rgbd radiance(const Vec3d& v, Rng& rng) const;
 
  private:
@@ -50,7 +50,7 @@ class PixelSums {
     Rgbd value;
   };
 
-  const PerspectiveCamera& camera_;
+  const Camera& camera_;
   FilterWeights weights_;
   PathTracer tracer_;
   std::uint64_t seed_;

@@ -28,7 +28,7 @@ class PrimaryBlocks {
       set_emission();
   }
 
-  /// The first direction, and what leaves the emitter.
+  /// The coordinate of the first ray, and what leaves the emitter.
   Vec3<T> operator()(int k) const {
     const int t = path_.strategy.t;
     if (k == 0 && t > 1) return scene_.camera().direction(Vec2<T>(u_(0), u_(1)));

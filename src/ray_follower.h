@@ -23,13 +23,13 @@ struct SurfaceHit {
 
 class RayFollower {
  public:
-  /// Starts at the sensor.
+  /// Starts at the sensor, v the coordinate of the ray there.
   RayFollower(const Scene& scene, const Vec3d& v)
       : scene_(scene),
-        ray_{scene.camera().origin, v},
+        ray_(scene.camera().ray(v)),
         start_(ray_.origin),
-        t_min_(scene.camera().near_clip / scene.camera().cosine(v)),
-        t_max_(scene.camera().far_clip / scene.camera().cosine(v)) {}
+        t_min_(scene.camera().near_clip / scene.camera().cosine(ray_.direction)),
+        t_max_(scene.camera().far_clip / scene.camera().cosine(ray_.direction)) {}
 
   /// Starts at `origin`; `start` is the origin, moved off the surface that it lies on.
   RayFollower(const Scene& scene, const Vec3d& origin, const Vec3d& start, const Vec3d& v)

@@ -3,7 +3,7 @@
 
 namespace driftlight {
 
-SampleFilm::SampleFilm(const PerspectiveCamera& camera, std::uint64_t seed, int layers)
+SampleFilm::SampleFilm(const Camera& camera, std::uint64_t seed, int layers)
     : camera_(camera),
       weights_(camera.filter, camera.film_width, camera.film_height),
       seed_(seed),

@@ -22,7 +22,7 @@ namespace driftlight {
 /// added to the one that it names.
 class SampleFilm {
  public:
-  SampleFilm(const PerspectiveCamera& camera, std::uint64_t seed, int layers);
+  SampleFilm(const Camera& camera, std::uint64_t seed, int layers);
 
   /// Where one sample puts what it finds.
   class Sink;
@@ -59,7 +59,7 @@ class SampleFilm {
   /// Adds the splats of the first tasks.
   void merge(std::size_t tasks);
 
-  const PerspectiveCamera& camera_;
+  const Camera& camera_;
   FilterWeights weights_;
   std::uint64_t seed_;
   std::vector<Rgbd> sums_;

@@ -380,6 +380,9 @@ Scene Scene::with_emitters(std::vector<Emitter> emitters) const {
 // ---- SceneBuilder ---------------------------------------------------------------------------
 
 std::uint32_t SceneBuilder::add_bsdf(Bsdf bsdf) {
+  if (lobe_count(bsdf) > kMaxLobes)
+    throw InputError("a bsdf of " + std::to_string(lobe_count(bsdf)) + " lobes; the limit is " +
+                     std::to_string(kMaxLobes));
   scene_.surfaces_->bsdfs.push_back(std::move(bsdf));
   return static_cast<std::uint32_t>(scene_.surfaces_->bsdfs.size() - 1);
 }
@@ -432,7 +435,7 @@ void SceneBuilder::set_environment(Emitter environment) {
   scene_.emitters_.push_back(std::move(environment));
 }
 
-void SceneBuilder::set_camera(const PerspectiveCamera& camera) { scene_.camera_ = camera; }
+void SceneBuilder::set_camera(const Camera& camera) { scene_.camera_ = camera; }
 
 Scene SceneBuilder::build() {
   Scene& scene = scene_;

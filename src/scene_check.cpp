@@ -59,6 +59,9 @@ struct Brightness {
     const bool opaque = b.opacity.is_constant() && (b.opacity.color >= 1.0).all();
     return opaque ? nested : 1.0;
   }
+  double operator()(const Blend& b) const {
+    return std::max(std::visit(*this, b.first->bsdf), std::visit(*this, b.second->bsdf));
+  }
   template <class B>
   static double coated(const B& b) {
     return std::max(b.base.reflectance.maximum(), b.specular_reflectance.maximum());

@@ -65,7 +65,7 @@ struct PilotRun {
 /// A pilot's splitter with what it is to do.
 struct Setup {
   const Splitter& splitter;
-  const PerspectiveCamera& camera;
+  const Camera& camera;
   std::uint64_t seed;
 
   int pixel(const Vec2d& film) const {

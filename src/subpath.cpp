@@ -48,12 +48,19 @@ Rgbd scattered(const SurfaceHit& x, const Vec3d& wi, const Vec3d& wo) {
   return color_of(eval(*x.bsdf, x.surface(), wi, wo));
 }
 
-/// v is uniform over the film: its density is the importance W(v). No strategy gives up the sensor.
+/// v is uniform over the film: its density is the importance W(v), by area across parallel rays
+/// that over Camera::spread. No strategy gives up the sensor.
 Departure SubpathTracer::leave_sensor(const Vec3d& v) const {
+  const Camera& camera = scene_.camera();
+  const Ray<double> ray = camera.ray(v);
   Departure from;
-  from.p = scene_.camera().origin;
-  from.direction = v;
-  from.density = std::exp(scene_.camera().log_importance(v));
+  from.p = ray.origin;
+  from.direction = ray.direction;
+  from.density = std::exp(camera.log_importance(v));
+  if (camera.is_orthographic()) {
+    from.parallel = true;
+    from.density /= camera.spread(v, ray.origin);
+  }
   from.throughput = Rgbd::Ones();
   from.others = 0.0;
   from.connects = true;
@@ -66,7 +73,7 @@ Departure SubpathTracer::leave_light(const Emission& emission) const {
   Departure from;
   from.p = end.p;
   from.direction = emission.direction;
-  from.at_infinity = end.at_infinity();
+  from.parallel = end.at_infinity();
   from.cosine = emission.cosine;
   from.density = guide_.density(emission);
   from.throughput =
@@ -79,7 +86,7 @@ Departure SubpathTracer::leave_light(const Emission& emission) const {
 SubpathVertex SubpathTracer::arrive(const Departure& from, const SurfaceHit& surface) const {
   SubpathVertex x;
   x.surface = surface;
-  const double inverse_r2 = from.at_infinity ? 1.0 : 1.0 / (surface.at.p - from.p).squaredNorm();
+  const double inverse_r2 = from.parallel ? 1.0 : 1.0 / (surface.at.p - from.p).squaredNorm();
   x.density = from.density * std::abs(surface.at.n_g.dot(surface.wi)) * inverse_r2;
   x.others = power_(from.cosine * inverse_r2) * from.others;
   x.previous_connects = from.connects;

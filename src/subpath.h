@@ -58,9 +58,11 @@ struct SubpathVertex : Arrival {
 struct Departure {
   Vec3d p{0, 0, 0};          ///< where it comes from
   Vec3d direction{0, 0, 0};  ///< unit
-  bool at_infinity = false;  ///< from an emitter at infinity: p has no meaning
-  double cosine = 1;         ///< |n_g . omega| there; 1 at the sensor, at points and at infinity
-  double density = 0;        ///< of the ray, per solid angle; from infinity per area across it
+  /// One of parallel rays: from an emitter at infinity, where p has no meaning, or an orthographic
+  /// sensor.
+  bool parallel = false;
+  double cosine = 1;   ///< |n_g . omega| there; 1 at the sensor, at points and at infinity
+  double density = 0;  ///< of the ray, per solid angle; of parallel ones per area across them
   Rgbd throughput{0, 0, 0};
   double roulette = 1;  ///< as of a vertex
   double others = 0;    ///< of the next vertex, without its g^b
@@ -102,7 +104,8 @@ class SubpathTracer {
                 Roulette roulette = Roulette::On)
       : scene_(scene), guide_(guide), power_(heuristic), roulette_(roulette) {}
 
-  /// Leaves the sensor along v. Its throughput makes the path an estimate of the radiance there.
+  /// Leaves the sensor by the ray of the coordinate v. Its throughput makes the path an estimate of
+  /// the radiance there.
   Departure leave_sensor(const Vec3d& v) const;
   /// Leaves the light along a ray.
   Departure leave_light(const Emission& emission) const;

@@ -81,12 +81,15 @@ std::optional<LampExtent> lamp_extent(const Shape& shape) {
 }
 
 /// Angle under which the lamp's thinner side shows: from the sensor, or from the far side of the
-/// scene if that is nearer.
+/// scene if that is nearer or the sensor is orthographic.
 double angular_size(const LampExtent& lamp, const Scene& scene) {
   double least = lamp.variance.maxCoeff();
   for (const double variance : lamp.variance)
     if (variance > 0.0) least = std::min(least, variance);
-  const double distance = std::min(scene.radius(), (scene.camera().origin - lamp.center).norm());
+  double distance = scene.radius();
+  const Camera& camera = scene.camera();
+  if (!camera.is_orthographic())
+    distance = std::min(distance, (camera.origin - lamp.center).norm());
   return std::sqrt(least) / distance;
 }
 

@@ -21,9 +21,13 @@ struct VisitorPair : WalkVisitor<T> {
   explicit VisitorPair(std::in_place_t, Arguments&&... arguments)
       : second(std::forward<Arguments>(arguments)...) {}
 
-  void sensor(const PerspectiveCamera& camera, const Vec3<T>& v) {
+  void sensor(const Camera& camera, const Vec3<T>& v) {
     first.sensor(camera, v);
     second.sensor(camera, v);
+  }
+  void depart_parallel(Ray<T>& ray) {
+    first.depart_parallel(ray);
+    second.depart_parallel(ray);
   }
   void position(const Shape& shape, const Vec3<T>& p) {
     first.position(shape, p);

@@ -328,7 +328,7 @@ TEST(LightTracing, ClipPlanesCutConnections) {
     builder.add_shape(quad({-3, -3, -4}, {6, 0, 0}, {0, 6, 0}), material);
     builder.add_shape(quad({-1, -1, -2}, {2, 0, 0}, {0, 2, 0}), material);
     builder.add_emitter(PointEmitter{{0.3, 0.2, 1.0}, Rgbd::Constant(10.0)});
-    PerspectiveCamera camera = look_at({0, 0, 0}, {0, 0, -1}, 0.3);
+    Camera camera = look_at({0, 0, 0}, {0, 0, -1}, 0.3);
     camera.near_clip = near_clip;
     camera.far_clip = far_clip;
     builder.set_camera(camera);

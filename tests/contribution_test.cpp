@@ -69,7 +69,7 @@ class OneBounce {
     builder.add_shape(quad({-4, -4, -8}, {8, 0, 0}, {0, 8, 0}), black, kBackRadiance);
     builder.add_emitter(PointEmitter{kBulb, kBulbIntensity});
     builder.set_environment(ConstantEnvironment{kSky});
-    PerspectiveCamera camera = look_at({0, 0, 0}, {0, 0, -1}, 0.6);
+    Camera camera = look_at({0, 0, 0}, {0, 0, -1}, 0.6);
     camera.half_height = 0.4;
     builder.set_camera(camera);
     return builder.build();
@@ -199,7 +199,7 @@ TEST(Contribution, SumOfLogarithmsEqualsTheProduct) {
     void multiply(const ScaledColor<double>& factor) {
       f *= std::exp(factor.log_scale) * factor.color;
     }
-    void sensor(const PerspectiveCamera& camera, const Vec3d& v) {
+    void sensor(const Camera& camera, const Vec3d& v) {
       f *= 1.0 / (camera.area() * std::pow(camera.forward.dot(v), 3));
     }
     void scatter(const ScatterEvent<double>& e) { multiply(eval(e.bsdf, e.surface(), e.wi, e.wo)); }

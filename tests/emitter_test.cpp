@@ -141,7 +141,7 @@ Scene lit_floor(const Vec3d& x, const std::function<void(SceneBuilder&)>& light)
       builder.add_material({builder.add_bsdf(Diffuse{Texture(kAlbedo)}), std::nullopt});
   builder.add_shape(quad({-9, 0, 9}, {18, 0, 0}, {0, 0, -18}), floor);
   light(builder);
-  PerspectiveCamera camera = look_at({0.3, 4.0, 5.0}, x, 1e-7);
+  Camera camera = look_at({0.3, 4.0, 5.0}, x, 1e-7);
   camera.film_width = camera.film_height = 1;
   builder.set_camera(camera);
   return builder.build();

@@ -200,7 +200,7 @@ TEST(Film, IntegratorsShareTheFilter) {
   const auto black = builder.add_bsdf(Diffuse{Texture(Rgbd::Zero())});
   builder.add_shape(quad({0, -9, 1}, {0, 18, 0}, {-9, 0, 0}),
                     builder.add_material({black, std::nullopt}), Rgbd::Ones());
-  PerspectiveCamera camera = look_at({0, 0, 3}, {0, 0, 0}, 0.5);
+  Camera camera = look_at({0, 0, 3}, {0, 0, 0}, 0.5);
   camera.film_width = camera.film_height = 8;
   camera.filter = {Kind::Cubic, 2.0};
   builder.set_camera(camera);

@@ -26,7 +26,8 @@ struct Fault {
   std::function<void(const Geometry&, SurfaceDifferential&)> surface;
   std::function<double(const Geometry&)> hit_cosine;  ///< a factor
   std::function<Vec3d(const Vec3d& v, const Vec3d& n, double cosine, const Vec3d& q)> hit_adjoint;
-  std::function<Vec3d(const PerspectiveCamera&, const Vec3d& v)> camera;
+  std::function<Vec3d(const Camera&, const Vec3d& v)> camera;
+  std::function<Vec3d(const Vec3d& v_bar)> parallel_camera;
   std::function<Vec3d(const Vec3d& w, double r, const Vec3d& w_bar)> connection_adjoint;
   std::function<void(Vec3d&)> environment;
   std::function<void(Vec3d&)> spot;
@@ -69,8 +70,12 @@ struct FaultyRules : HandRules {
     return fault->hit_adjoint ? fault->hit_adjoint(v, n, cosine, q)
                               : HandRules::hit_adjoint(v, n, cosine, q);
   }
-  static Vec3d camera(const PerspectiveCamera& camera, const Vec3d& v) {
+  static Vec3d camera(const Camera& camera, const Vec3d& v) {
     return fault->camera ? fault->camera(camera, v) : HandRules::camera(camera, v);
+  }
+  static Vec3d parallel_camera(const Camera& camera, const Vec3d& v, const Vec3d& x_bar) {
+    const Vec3d v_bar = HandRules::parallel_camera(camera, v, x_bar);
+    return fault->parallel_camera ? fault->parallel_camera(v_bar) : v_bar;
   }
   static Vec3d connection_adjoint(const Vec3d& w, double r, const Vec3d& w_bar) {
     return fault->connection_adjoint ? fault->connection_adjoint(w, r, w_bar)
@@ -256,9 +261,13 @@ std::vector<Fault> geometry_faults() {
 }
 
 std::vector<Fault> end_faults() {
-  std::vector<Fault> faults(7);
+  std::vector<Fault> faults(9);
+  faults[7].name = "orthographic camera: sign";
+  faults[7].parallel_camera = [](const Vec3d& v_bar) { return Vec3d(-v_bar); };
+  faults[8].name = "orthographic camera: factor";
+  faults[8].parallel_camera = [](const Vec3d& v_bar) { return Vec3d(1.01 * v_bar); };
   faults[0].name = "camera: power of the cosine";
-  faults[0].camera = [](const PerspectiveCamera& camera, const Vec3d& v) {
+  faults[0].camera = [](const Camera& camera, const Vec3d& v) {
     return Vec3d(2.0 / 3.0 * HandRules::camera(camera, v));
   };
   faults[1].name = "connection: power of the length";

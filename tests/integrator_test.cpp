@@ -48,7 +48,7 @@ Scene frosted() {
   builder.add_shape(test::round_mesh({0.1, 0.3, 1.0}, 0.25, 4), white);
   builder.set_environment(
       EnvironmentMap(test::sun_bitmap(32, 16, 60.0F), Eigen::Matrix3d::Identity(), 1.0));
-  PerspectiveCamera camera = test::look_at({0.3, 1.6, 3.0}, {0, 0.4, 0}, 0.5);
+  Camera camera = test::look_at({0.3, 1.6, 3.0}, {0, 0.4, 0}, 0.5);
   camera.half_height = 0.375;
   camera.film_width = 32;
   camera.film_height = 24;
@@ -72,6 +72,7 @@ LoadedScene bidirectional_scene(const std::string& name) {
   if (name == "frosted") return {frosted(), 6, {}};
   if (name == "limelight") return {limelight(), 5, {}};
   if (name == "coated") return {test::coated(false), 5, {}};
+  if (name == "plan") return {test::plan(false), 5, {}};
   if (name == "ring_caustic") return load_small(name, {{"alpha", "0.2"}});
   if (name == "glass_caustic") return load_small(name, {{"light", "0.6"}});
   return load_small(name);
@@ -119,7 +120,8 @@ INSTANTIATE_TEST_SUITE_P(Scenes, BidirectionalEqualsPath,
                                          BidirectionalWork{"door_ajar", 200, 48, 0, 0.08},
                                          BidirectionalWork{"ring_caustic", 128, 48, 128, 0.02},
                                          BidirectionalWork{"limelight", 48, 24, 96, 0.02},
-                                         BidirectionalWork{"coated", 96, 24, 0, 0.04}),
+                                         BidirectionalWork{"coated", 96, 24, 0, 0.04},
+                                         BidirectionalWork{"plan", 96, 24, 0, 0.04}),
                          [](const auto& instance) { return std::string(instance.param.scene); });
 
 /// A closed sphere of radiance L and albedo rho shows L (1 - rho^n) / (1 - rho) everywhere.

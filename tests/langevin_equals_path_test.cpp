@@ -38,6 +38,7 @@ const std::map<std::string, Work>& works() {
       {"ring_caustic", {300, 200, 200000, 0.04}},
       {"limelight", {256, 200, 100000, 0.02}},
       {"coated", {256, 200, 200000, 0.05}},
+      {"plan", {256, 200, 200000, 0.05}},
       {"sun_pane", {600, 200, 100000, 0.05}},
       {"lamp_in_glass", {1500, 200, 200000, 0.12}}};
   return kWorks;
@@ -100,6 +101,7 @@ LoadedScene sun_pane_in_haze() {
 LoadedScene load_scene_of(const std::string& name) {
   if (name == "limelight") return {test::limelight(), 5, {}};
   if (name == "coated") return {test::coated(false), 5, {}};
+  if (name == "plan") return {test::plan(false), 5, {}};
   if (name == "sun_pane") return sun_pane_in_haze();
   if (name == "lamp_in_glass") return load_small(name, {{"filament", "0.1"}});
   if (name == "ring_caustic") return load_small(name, {{"alpha", "0.2"}});
@@ -171,7 +173,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"limelight", "redistribution_both_ends"}, Case{"sun_pane", "splitting"},
                     Case{"sun_pane", "high_threshold"}, Case{"glass_caustic", "splitting"},
                     Case{"lamp_in_glass", "two_levels"}, Case{"coated", "gradient"},
-                    Case{"coated", "redistribution_both_ends"}),
+                    Case{"coated", "redistribution_both_ends"}, Case{"plan", "gradient"},
+                    Case{"plan", "both_ends"}),
     name_of);
 
 /// All of them, but for an island of glass_caustic, the lamp's reflection, that one strategy alone

@@ -83,7 +83,7 @@ TEST(Dialect, ReadsAWholeSceneOfMitsuba3) {
       value="12"/><float name="intensity" value="2"/></emitter>)"));
   EXPECT_TRUE(loaded.notices.empty()) << loaded.notices[0];
   EXPECT_EQ(loaded.max_depth, 7);
-  const PerspectiveCamera& camera = loaded.scene.camera();
+  const Camera& camera = loaded.scene.camera();
   expect_near(camera.forward, Vec3d(0, 0, -1));
   EXPECT_NEAR(camera.half_height, std::tan(kPi / 6.0), 1e-12);
   EXPECT_EQ(camera.near_clip, 2);

@@ -195,6 +195,42 @@ const Fault kPluginFaults[] = {
     {"TwoSidedTwice",
      R"(<bsdf type="twosided">@<bsdf type="twosided"><bsdf type="phong"/></bsdf></bsdf>)",
      {"one-sided"}},
+    {"BlendWithoutWeight",
+     R"(@<bsdf type="blendbsdf"><bsdf type="diffuse"/><bsdf type="diffuse"/></bsdf>)",
+     {"'weight'"}},
+    {"BlendOfOne",
+     R"(@<bsdf type="blendbsdf"><float name="weight" value="0.5"/><bsdf type="diffuse"/></bsdf>)",
+     {"two nested bsdfs"}},
+    {"WeightAboveOne",
+     R"(<bsdf type="blendbsdf">@<float name="weight" value="1.5"/>)"
+     R"(<bsdf type="diffuse"/><bsdf type="diffuse"/></bsdf>)",
+     {"'weight'", "between 0 and 1"}},
+    {"BlendOfGlasses",
+     R"(@<bsdf type="blendbsdf"><float name="weight" value="0.5"/><bsdf type="dielectric"/>)"
+     R"(<bsdf type="thindielectric"/></bsdf>)",
+     {"refract differently"}},
+    {"BlendOfMaskAndGlass",
+     R"(@<bsdf type="blendbsdf"><float name="weight" value="0.5"/><bsdf type="dielectric"/>)"
+     R"(<bsdf type="mask"><bsdf type="diffuse"/></bsdf></bsdf>)",
+     {"twosided or a mask"}},
+    {"BlendOfTooMany",
+     R"(@<bsdf type="mixturebsdf"><string name="weights" value="0.3, 0.3, 0.4"/>)"
+     R"(<bsdf type="phong"/><bsdf type="roughplastic"/><bsdf type="diffuse"/></bsdf>)",
+     {"5 diffuse and glossy lobes", "the limit is 4"}},
+    {"MissingWeights",
+     R"(<bsdf type="mixturebsdf">@<string name="weights" value="0.3"/>)"
+     R"(<bsdf type="phong"/><bsdf type="diffuse"/></bsdf>)",
+     {"1 weights for 2 nested"}},
+    {"SunBelowTheHorizon",
+     R"(@<emitter type="sky"><vector name="sunDirection" x="1" y="-0.1" z="0"/></emitter>)",
+     {"below the horizon"}},
+    {"SunTwice",
+     R"(<emitter type="sun"><vector name="sunDirection" x="1" y="1" z="0"/>)"
+     R"(@<float name="latitude" value="50"/></emitter>)",
+     {"'latitude'", "sunDirection"}},
+    {"Turbidity",
+     R"(<emitter type="sunsky">@<float name="turbidity" value="11"/></emitter>)",
+     {"'turbidity'", "1 and 10"}},
     {"TwoSidedNothing", R"(@<bsdf type="twosided"/>)", {"one or two"}},
     {"SingularTransform",
      R"(<shape type="sphere">@<transform name="toWorld"><scale x="0"/></transform>)"
@@ -309,6 +345,11 @@ const Fault kSensorFaults[] = {
      R"(<sensor type="perspective"><film type="hdrfilm"><rfilter type="box"/></film>)"
      R"(@<transform name="toWorld"><scale value="2"/></transform></sensor>)",
      {"scale"}},
+    {"ScaledOrthographicSensor",
+     R"(<sensor type="orthographic"><film type="hdrfilm"/>)"
+     R"(@<transform name="toWorld"><matrix value="1 1 0 0 0 1 0 0 0 0 1 0 0 0 0 1"/></transform>)"
+     "</sensor>",
+     {"shear"}},
     {"ClipPlanes",
      R"(<sensor type="perspective"><film type="hdrfilm"><rfilter type="box"/></film>)"
      R"(@<float name="nearClip" value="5"/><float name="farClip" value="5"/></sensor>)",

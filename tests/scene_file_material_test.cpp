@@ -186,6 +186,50 @@ TEST(BsdfsXml, OpaqueBsdfsHaveNoBackUnlessTwoSided) {
   EXPECT_TRUE(std::holds_alternative<Diffuse>(bsdfs[*material(2).back]));
 }
 
+TEST(BsdfsXml, ReadsBlends) {
+  const auto blend = std::get<Blend>(load_bsdf(
+      R"(<bsdf type="blendbsdf"><rgb name="weight" value="0.3, 0.6, 0.9"/>
+         <bsdf type="diffuse"/><bsdf type="dielectric"/></bsdf>)"));
+  EXPECT_NEAR(blend.weight.color[0], 0.6, 1e-12);
+  EXPECT_TRUE(std::holds_alternative<Diffuse>(blend.first->bsdf));
+  EXPECT_TRUE(std::holds_alternative<Dielectric>(blend.second->bsdf));
+  EXPECT_TRUE(is_transmissive(blend));
+}
+
+// Law: a blend of what has two sides has two sides; black is blended where only one has.
+TEST(BsdfsXml, BlendsBothSides) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(lit(
+      R"(<shape type="sphere"><bsdf type="blendbsdf"><float name="weight" value="0.25"/>
+           <bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="0.4"/></bsdf>
+           </bsdf><bsdf type="roughconductor"/></bsdf></shape>)"));
+  const Material& material = loaded.scene.materials()[0];
+  ASSERT_TRUE(material.back.has_value());
+  const auto& back = std::get<Blend>(loaded.scene.bsdfs()[*material.back]);
+  EXPECT_EQ(back.weight.color[0], 0.25);
+  expect_near(std::get<Diffuse>(back.first->bsdf).reflectance.color, Rgbd(0.4, 0.4, 0.4));
+  expect_near(std::get<Diffuse>(back.second->bsdf).reflectance.color, Rgbd(0, 0, 0));
+}
+
+// Law: a mixture is the weighted sum of its parts.
+TEST(BsdfsXml, MixturesAreWeightedSums) {
+  const Bsdf mixture = load_bsdf(
+      R"(<bsdf type="mixturebsdf"><string name="weights" value="0.2, 0.3, 0.4"/>
+         <bsdf type="diffuse"><rgb name="reflectance" value="0.5"/></bsdf>
+         <bsdf type="phong"/>
+         <bsdf type="diffuse"><rgb name="reflectance" value="0.9"/></bsdf></bsdf>)");
+  const Bsdf phong = load_bsdf(R"(<bsdf type="phong"/>)");
+  const SurfacePoint<double> at{Vec3d::UnitZ(), Vec2d::Zero()};
+  const Vec3d wi = Vec3d(0.3, 0.1, 1).normalized();
+  const Vec3d wo = Vec3d(-0.2, -0.3, 1).normalized();
+  const auto value = [&](const Bsdf& bsdf) {
+    const ScaledColor<double> f = eval(bsdf, at, wi, wo);
+    return std::exp(f.log_scale) * luminance(f.color);
+  };
+  const double expected = (0.2 * 0.5 + 0.4 * 0.9) * wo.z() / kPi + 0.3 * value(phong);
+  EXPECT_NEAR(value(mixture), expected, 1e-6 * expected);
+}
+
 TEST(BsdfsXml, ShapesShareReferredMaterials) {
   const SceneDirectory directory;
   const LoadedScene loaded = directory.load(lit(

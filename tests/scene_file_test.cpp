@@ -26,7 +26,7 @@ std::string sensor(const std::string& properties, int width = 200, int height = 
          R"(<rfilter type="box"/></film></sensor>)";
 }
 
-PerspectiveCamera load_camera(const std::string& properties, int width = 200, int height = 100) {
+Camera load_camera(const std::string& properties, int width = 200, int height = 100) {
   const SceneDirectory directory;
   const std::string text = scene_file(sensor(properties, width, height) + kEmitter + kShape);
   return directory.load(text).scene.camera();
@@ -124,7 +124,7 @@ TEST(SceneFile, KeepsTheDepthOfForeignBlocks) {
 // --- The sensor ----------------------------------------------------------------------------------
 
 TEST(SensorXml, LooksAlongZWithXOnTheLeft) {
-  const PerspectiveCamera camera = load_camera(R"(<float name="fov" value="60"/>)");
+  const Camera camera = load_camera(R"(<float name="fov" value="60"/>)");
   expect_near(camera.right, Vec3d(-1, 0, 0));
   expect_near(camera.up, Vec3d(0, 1, 0));
   expect_near(camera.forward, Vec3d(0, 0, 1));
@@ -142,8 +142,8 @@ TEST(SensorXml, CropsTheFilm) {
         crop + R"(<rfilter type="box"/></film></sensor>)";
     return directory.load(scene_file(sensor + kEmitter + kShape)).scene.camera();
   };
-  const PerspectiveCamera whole = load("");
-  const PerspectiveCamera part = load(
+  const Camera whole = load("");
+  const Camera part = load(
       R"(<integer name="cropOffsetX" value="12"/><integer name="cropOffsetY" value="4"/>
          <integer name="cropWidth" value="20"/><integer name="cropHeight" value="6"/>)");
   EXPECT_EQ(part.film_width, 20);
@@ -189,8 +189,45 @@ TEST(SensorXml, ReadsFilters) {
          2.0);
 }
 
+// Law: with an offset each film point shows what is beside it without, also where it is cropped.
+TEST(SensorXml, ShiftsTheFilm) {
+  const std::string fov = R"(<float name="fov" value="70"/>)";
+  const Camera plain = load_camera(fov);
+  const Camera shifted = load_camera(fov + R"(<float name="principalPointOffsetX" value="0.25"/>
+                                             <float name="principalPointOffsetY" value="-0.1"/>)");
+  for (const Vec2d& film : {Vec2d(0.5, 0.5), Vec2d(0.1, 0.8)}) {
+    const Vec3d v = shifted.direction(film);
+    expect_near(v, plain.direction(Vec2d(film + Vec2d(0.25, -0.1))));
+    EXPECT_LT((shifted.film_position(v) - film).norm(), 1e-12);
+  }
+}
+
+// Law: an orthographic sensor sees [-1, 1] across, scaled by its transform, and as high as its
+// aspect wants.
+TEST(SensorXml, ReadsOrthographicSensors) {
+  const auto load = [](const std::string& to_world, int width, int height) {
+    const SceneDirectory directory;
+    const std::string sensor = R"(<sensor type="orthographic"><transform name="toWorld">)" +
+                               to_world +
+                               R"(</transform><film type="hdrfilm"><integer name="width" value=")" +
+                               std::to_string(width) + R"("/><integer name="height" value=")" +
+                               std::to_string(height) + R"("/></film></sensor>)";
+    return directory.load(scene_file(sensor + kEmitter + kShape)).scene.camera();
+  };
+  const Camera camera = load(R"(<scale x="10" y="5"/><lookat origin="1, 2, 3" target="1, 2, -5"
+                                up="0, 1, 0"/>)",
+                             200, 100);
+  EXPECT_TRUE(camera.is_orthographic());
+  for (const Vec2d& film : {Vec2d(0.5, 0.5), Vec2d(0.0, 0.0), Vec2d(1.0, 0.25)}) {
+    const Ray<double> ray = camera.ray<double>(camera.direction(film));
+    expect_near(ray.direction, Vec3d(0, 0, -1));
+    expect_near(ray.origin, Vec3d(1 + 10 * (2 * film.x() - 1), 2 + 2.5 * (1 - 2 * film.y()), 3));
+  }
+  EXPECT_NEAR(camera.area() * camera.scale * camera.scale, 20.0 * 5.0, 1e-9);
+}
+
 TEST(SensorXml, LooksAtItsTarget) {
-  const PerspectiveCamera camera = load_camera(
+  const Camera camera = load_camera(
       R"(<float name="fov" value="60"/><float name="nearClip" value="2"/>
          <float name="farClip" value="50"/><float name="focusDistance" value="7"/>
          <transform name="toWorld">
@@ -217,13 +254,13 @@ TEST(SensorXml, MeasuresTheFieldOfViewAlongItsAxis) {
   EXPECT_NEAR(camera("smaller", 100, 200).half_width, half, 1e-12);
   EXPECT_NEAR(camera("larger", 200, 100).half_width, half, 1e-12);
   EXPECT_NEAR(camera("larger", 100, 200).half_height, half, 1e-12);
-  const PerspectiveCamera diagonal = camera("diagonal", 200, 100);
+  const Camera diagonal = camera("diagonal", 200, 100);
   EXPECT_NEAR(std::hypot(diagonal.half_width, diagonal.half_height), half, 1e-12);
 }
 
 TEST(SensorXml, KnowsFocalLengths) {
   const auto diagonal = [](const std::string& properties) {
-    const PerspectiveCamera camera = load_camera(properties);
+    const Camera camera = load_camera(properties);
     return std::hypot(camera.half_width, camera.half_height);
   };
   const double film = std::hypot(36.0, 24.0);

@@ -52,7 +52,7 @@ Scene furnish(SceneBuilder builder) {
   const auto black = builder.add_bsdf(Diffuse{Texture(Rgbd::Zero())});
   builder.add_shape(quad({-0.4, 0.9, -0.4}, {0.8, 0, 0}, {0, 0, 0.8}),
                     builder.add_material({black, std::nullopt}), Rgbd(1.0, 0.9, 0.7));
-  PerspectiveCamera camera;
+  Camera camera;
   camera.origin = {0.05, 0.1, -0.9};
   camera.film_width = 64;
   camera.film_height = 64;

@@ -7,6 +7,7 @@
 /// need.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <variant>
@@ -124,11 +125,18 @@ struct Mask {
   std::shared_ptr<const BsdfBox> nested;
 };
 
+/// (1 - w) f_1 + w f_2 of two other BSDFs, w the first channel of `weight`, within [0, 1]. Where
+/// both transmit by a delta lobe these must go into the same direction (equal delta_eta).
+struct Blend {
+  Texture weight{Rgbd{0.5, 0.5, 0.5}};
+  std::shared_ptr<const BsdfBox> first, second;
+};
+
 /// A BSDF is a density (Diffuse, rough ones, Phong), one or two delta lobes (Conductor, Dielectric,
-/// ThinDielectric), or both (Plastic, Mask): then a path says at each vertex by which it goes on.
-/// There is at most one delta lobe of each kind of scattering.
+/// ThinDielectric), or both (Plastic, Mask, Blend): then a path says at each vertex by which it
+/// goes on. There is at most one delta lobe of each kind of scattering.
 using Bsdf = std::variant<Diffuse, Conductor, RoughConductor, Dielectric, RoughDielectric, Phong,
-                          Plastic, RoughPlastic, ThinDielectric, Mask>;
+                          Plastic, RoughPlastic, ThinDielectric, Mask, Blend>;
 
 struct BsdfBox {
   Bsdf bsdf;
@@ -144,6 +152,10 @@ bool has_delta(const Bsdf& bsdf, Scattering scattering);
 bool is_transmissive(const Bsdf& bsdf);
 /// True if it has a density, all of whose lobes are diffuse.
 bool is_diffuse(const Bsdf& bsdf);
+/// Most diffuse and glossy lobes of one BSDF, by which it bounds the constraints of a path.
+inline constexpr int kMaxLobes = 4;
+/// How many of them its density has.
+int lobe_count(const Bsdf& bsdf);
 /// Index behind n over that before it, for its delta transmission; 1: straight on.
 double delta_eta(const Bsdf& bsdf);
 
@@ -364,6 +376,54 @@ ScaledColor<T> eval_bsdf(const Mask& b, const SurfacePoint<T>& at, const Vec3<T>
   return {f.log_scale, b.opacity.eval(at.uv) * f.color};
 }
 
+/// (1 - w) f_1 + w f_2, in units of the larger one.
+template <Scalar T>
+ScaledColor<T> blended(const T& w, const ScaledColor<T>& f1, const ScaledColor<T>& f2) {
+  using std::exp;
+  const bool has_first = value(f1.color).maxCoeff() > 0.0;
+  const bool has_second = value(f2.color).maxCoeff() > 0.0;
+  if (!has_first && !has_second) return ScaledColor<T>::zero();
+  double unit = value(has_first ? f1.log_scale : f2.log_scale);
+  if (has_second) unit = std::max(unit, value(f2.log_scale));
+  ScaledColor<T> sum{constant<T>(unit), constant<T>(Rgbd{0, 0, 0})};
+  const auto add = [&](const T& share, const ScaledColor<T>& f) {
+    const T scale = share * exp(f.log_scale - unit);
+    for (int c = 0; c < 3; ++c) sum.color[c] += scale * f.color[c];
+  };
+  if (has_first) add(T(1.0 - w), f1);
+  if (has_second) add(w, f2);
+  return sum;
+}
+
+template <Scalar T>
+ScaledColor<T> eval_bsdf(const Blend& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                         const Vec3<T>& wo) {
+  return blended<T>(b.weight.eval(at.uv)[0], eval(b.first->bsdf, at, wi, wo),
+                    eval(b.second->bsdf, at, wi, wo));
+}
+
+/// The shares of the two in the luminance of the blend's density; 0 where that is 0.
+template <Scalar T>
+struct BlendShares {
+  T first, second;
+};
+template <Scalar T>
+BlendShares<T> blend_shares(const Blend& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                            const Vec3<T>& wo) {
+  const T w = b.weight.eval(at.uv)[0];
+  const ScaledColor<T> f1 = eval(b.first->bsdf, at, wi, wo);
+  const ScaledColor<T> f2 = eval(b.second->bsdf, at, wi, wo);
+  const ScaledColor<T> sum = blended<T>(w, f1, f2);
+  const T all = luminance(sum.color);
+  const auto share = [&](const T& weight, const ScaledColor<T>& f) {
+    using std::exp;
+    const T own = luminance(f.color);
+    if (!(value(own) > 0.0 && value(all) > 0.0)) return constant<T>(0.0);
+    return T(weight * own * exp(f.log_scale - sum.log_scale) / all);
+  };
+  return {share(T(1.0 - w), f1), share(w, f2)};
+}
+
 /// F and 1 - F of an interface, passed from the side where n . wi has this sign.
 template <Scalar T>
 T interface_reflectance(double eta, const T& cos_i) {
@@ -431,6 +491,14 @@ ScaledColor<T> eval_delta_lobe(const Mask& b, const SurfacePoint<T>& at, const V
   const T scale = exp(f.log_scale);
   for (int c = 0; c < 3; ++c) color[c] = 1.0 - opacity[c] + opacity[c] * scale * f.color[c];
   return {constant<T>(0.0), color};
+}
+
+/// Both lobes go into one direction.
+template <Scalar T>
+ScaledColor<T> eval_delta_lobe(const Blend& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                               Scattering scattering) {
+  return blended<T>(b.weight.eval(at.uv)[0], eval_delta(b.first->bsdf, at, wi, scattering),
+                    eval_delta(b.second->bsdf, at, wi, scattering));
 }
 
 /// Those that have no delta lobe.

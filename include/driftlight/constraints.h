@@ -21,7 +21,7 @@ class ConstraintVisitor : public WalkVisitor<T> {
   explicit ConstraintVisitor(Sink& sink) : sink_(sink) {}
 
   /// Film position: uniform on the film, half side / sqrt(3); 1 / sqrt(12) in film coordinates.
-  void sensor(const PerspectiveCamera& camera, const Vec3<T>& v) {
+  void sensor(const Camera& camera, const Vec3<T>& v) {
     const Vec2<T> film = camera.film_position(v);
     const S precision = constant<S>(12.0);
     sink_.add(film.x(), precision);
@@ -38,9 +38,7 @@ class ConstraintVisitor : public WalkVisitor<T> {
     }
   }
 
-  void scatter(const ScatterEvent<T>& e) {
-    std::visit([&](const auto& bsdf) { constrain(bsdf, e); }, e.bsdf);
-  }
+  void scatter(const ScatterEvent<T>& e) { constrain(e.bsdf, e, constant<S>(1.0)); }
   void connect(const ScatterEvent<T>& e) { scatter(e); }
 
   /// Environment map: the direction, by the map's own precision.
@@ -83,6 +81,9 @@ class ConstraintVisitor : public WalkVisitor<T> {
 
  private:
   static Vec3<S> stripped(const Vec3<T>& v) { return {strip(v.x()), strip(v.y()), strip(v.z())}; }
+  static Vec2<S> uv_of(const ScatterEvent<T>& e) {
+    return {strip(e.at.uv.x()), strip(e.at.uv.y())};
+  }
 
   void add(const Vec3<T>& residual, const S& precision) {
     for (int i = 0; i < 3; ++i) sink_.add(residual[i], precision);
@@ -115,48 +116,60 @@ class ConstraintVisitor : public WalkVisitor<T> {
     add(v + minus_cosine, responsibility / (sigma * sigma));
   }
 
-  void constrain(const Diffuse&, const ScatterEvent<T>& e) { add_diffuse(e, constant<S>(1.0)); }
-  void constrain(const Conductor&, const ScatterEvent<T>&) {}
-  void constrain(const Dielectric&, const ScatterEvent<T>&) {}
-  void constrain(const RoughConductor& b, const ScatterEvent<T>& e) {
-    add_slopes(b.microfacets, slopes(e, 1.0), constant<S>(1.0));
+  // `share` is that of the BSDF in a blend.
+
+  void constrain(const Bsdf& bsdf, const ScatterEvent<T>& e, const S& share) {
+    std::visit([&](const auto& b) { constrain(b, e, share); }, bsdf);
   }
-  void constrain(const RoughDielectric& b, const ScatterEvent<T>& e) {
+  void constrain(const Diffuse&, const ScatterEvent<T>& e, const S& share) {
+    add_diffuse(e, share);
+  }
+  void constrain(const Conductor&, const ScatterEvent<T>&, const S&) {}
+  void constrain(const Dielectric&, const ScatterEvent<T>&, const S&) {}
+  void constrain(const RoughConductor& b, const ScatterEvent<T>& e, const S& share) {
+    add_slopes(b.microfacets, slopes(e, 1.0), share);
+  }
+  void constrain(const RoughDielectric& b, const ScatterEvent<T>& e, const S& share) {
     const bool outside = value(dot(e.at.n_s, e.wi)) > 0.0;
     const double eta = e.scattering == Scattering::Reflection ? 1.0 : outside ? b.eta : 1.0 / b.eta;
-    add_slopes(b.microfacets, slopes(e, eta), constant<S>(1.0));
+    add_slopes(b.microfacets, slopes(e, eta), share);
   }
 
-  void constrain(const ThinDielectric&, const ScatterEvent<T>&) {}
-  void constrain(const Plastic&, const ScatterEvent<T>& e) { add_diffuse(e, constant<S>(1.0)); }
-  void constrain(const RoughPlastic& b, const ScatterEvent<T>& e) {
-    const Vec2<S> uv{strip(e.at.uv.x()), strip(e.at.uv.y())};
+  void constrain(const ThinDielectric&, const ScatterEvent<T>&, const S&) {}
+  void constrain(const Plastic&, const ScatterEvent<T>& e, const S& share) {
+    add_diffuse(e, share);
+  }
+  void constrain(const RoughPlastic& b, const ScatterEvent<T>& e, const S& share) {
     const auto part = detail::rough_plastic_parts(
         b, S(strip(dot(e.at.n_s, e.wi))), S(strip(dot(e.at.n_s, e.wo))), S(strip(dot(e.wi, e.wo))));
-    const S specular = luminance(b.specular_reflectance.eval(uv)) * part.specular;
-    const S diffuse = luminance(b.base.albedo(uv)) * part.diffuse;
+    const S specular = luminance(b.specular_reflectance.eval(uv_of(e))) * part.specular;
+    const S diffuse = luminance(b.base.albedo(uv_of(e))) * part.diffuse;
     if (!(value(specular) + value(diffuse) > 0.0)) return;
-    const S share = specular / (specular + diffuse);
-    if (value(share) > 0.0) add_slopes(b.microfacets, slopes(e, 1.0), share);
-    if (value(share) < 1.0) add_diffuse(e, 1.0 - share);
+    const S coat = specular / (specular + diffuse);
+    if (value(coat) > 0.0) add_slopes(b.microfacets, slopes(e, 1.0), S(share * coat));
+    if (value(coat) < 1.0) add_diffuse(e, S(share * (1.0 - coat)));
   }
-  void constrain(const Mask& b, const ScatterEvent<T>& e) {
-    if (b.nested == nullptr) return;
-    std::visit([&](const auto& nested) { constrain(nested, e); }, b.nested->bsdf);
+  void constrain(const Mask& b, const ScatterEvent<T>& e, const S& share) {
+    if (b.nested != nullptr) constrain(b.nested->bsdf, e, share);
+  }
+  void constrain(const Blend& b, const ScatterEvent<T>& e, const S& share) {
+    const auto of =
+        detail::blend_shares<S>(b, {stripped(e.at.n_s), uv_of(e)}, stripped(e.wi), stripped(e.wo));
+    if (value(of.first) > 0.0) constrain(b.first->bsdf, e, S(share * of.first));
+    if (value(of.second) > 0.0) constrain(b.second->bsdf, e, S(share * of.second));
   }
 
   /// Two lobes, each weighted by its share of f at X. The glossy one constrains wo to the mirror
   /// direction with sigma = 1 / sqrt(n).
-  void constrain(const Phong& b, const ScatterEvent<T>& e) {
+  void constrain(const Phong& b, const ScatterEvent<T>& e, const S& share) {
     const Vec3<T> mirror = reflect(e.wi, e.at.n_s);
-    const Vec2<S> uv{strip(e.at.uv.x()), strip(e.at.uv.y())};
     const S lobe = detail::phong_lobe(b, S(strip(dot(e.wo, mirror))));
-    const S specular = luminance(b.specular_reflectance.eval(uv)) * lobe;
-    const S diffuse = luminance(b.diffuse_reflectance.eval(uv)) * kInvPi;
+    const S specular = luminance(b.specular_reflectance.eval(uv_of(e))) * lobe;
+    const S diffuse = luminance(b.diffuse_reflectance.eval(uv_of(e))) * kInvPi;
     if (!(value(specular) + value(diffuse) > 0.0)) return;
-    const S share = specular / (specular + diffuse);
-    if (value(share) > 0.0) add(e.wo - mirror, share * b.exponent);
-    if (value(share) < 1.0) add_diffuse(e, 1.0 - share);
+    const S glossy = specular / (specular + diffuse);
+    if (value(glossy) > 0.0) add(e.wo - mirror, S(share * glossy * b.exponent));
+    if (value(glossy) < 1.0) add_diffuse(e, S(share * (1.0 - glossy)));
   }
 
   Sink& sink_;

@@ -40,9 +40,7 @@ namespace driftlight {
 template <Scalar T>
 class ContributionVisitor : public WalkVisitor<T> {
  public:
-  void sensor(const PerspectiveCamera& camera, const Vec3<T>& v) {
-    log_scale_ += camera.log_importance(v);
-  }
+  void sensor(const Camera& camera, const Vec3<T>& v) { log_scale_ += camera.log_importance(v); }
   void scatter(const ScatterEvent<T>& e) { multiply(eval(e.bsdf, e.surface(), e.wi, e.wo)); }
   void connect(const ScatterEvent<T>& e) { scatter(e); }
   void delta(const ScatterEvent<T>& e) {

@@ -51,6 +51,7 @@ class CholeskyFactor {
 ///   H = M_k + E^T P_k E + floor,  E = [A_k 0; 0 I]  (free),   P_{k-1} = H_ss - H_su K,
 ///   Lambda = H_uu = R^T R,  K = Lambda^-1 H_us,
 ///   P_{k-1} = M_k + [A_k; D_k]^T P_k [A_k; D_k]     (delta),
+/// at a point, which comes first, with E = [0 I; 0 0],
 /// and completing squares gives delta^T Q delta = sum_b |R_b (u_b + K_b s)|^2 = |F delta|^2: block
 /// b of F delta is R_b (u_b + K_b s) with s run forward from 0. F is block lower triangular, and
 /// every member costs O(length).

@@ -75,7 +75,9 @@ class GradientSweep : RecordedPath<Rules> {
       }
       arrive(x, a, x_bar, v_bar);
     }
-    store(0, v_bar + Rules::camera(scene_.camera(), path_.v0));
+    const Camera& camera = scene_.camera();
+    if (camera.is_orthographic()) v_bar = Rules::parallel_camera(camera, path_.v0, x_bar);
+    store(0, v_bar + Rules::camera(camera, path_.v0));
   }
 
  private:
@@ -156,6 +158,7 @@ class GradientSweep : RecordedPath<Rules> {
 
   /// The derivative by the joining edge.
   Vec3d joining_edge() const {
+    if (path_.count == 0 && scene_.camera().is_orthographic()) return Vec3d::Zero();  // (H33)
     const Vertex& y = this->light_end();
     const Vec3d w = -y.wo;
     Vec3d w_bar = -light_factor(y).wo;

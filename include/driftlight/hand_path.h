@@ -29,11 +29,12 @@ struct Vertex {
 template <class Rules>
 struct Recorder : WalkVisitor<double> {
   const PathTopology& topology;
-  const Vec3d& sensor_origin;
+  Vec3d sensor_origin;
   bool want_gradient;
   std::array<Vertex, kMaxPathLength> vertices;
-  int count = 0;  ///< of vertices; of those on the sensor's side where there is another
-  Vec3d v0;
+  int count = 0;             ///< of vertices; of those on the sensor's side where there is another
+  Vec3d v0;                  ///< the coordinate of the first ray
+  Vec3d departure;           ///< its direction
   Vec3d end;                 ///< where the path meets its emitter
   Vec3d last_v;              ///< the direction into the environment
   double connection_cosine;  ///< of the emitter's normal
@@ -52,7 +53,11 @@ struct Recorder : WalkVisitor<double> {
     return k == 0 ? sensor_origin : vertices[static_cast<std::size_t>(k - 1)].p;
   }
 
-  void sensor(const PerspectiveCamera&, const Vec3d& v) { v0 = v; }
+  void sensor(const Camera&, const Vec3d& v) { v0 = departure = v; }
+  void depart_parallel(const Ray<double>& ray) {
+    sensor_origin = ray.origin;
+    departure = ray.direction;
+  }
   void position(const Shape&, const Vec3d& p) { end = p; }
   void scatter(const ScatterEvent<double>& e) {
     Vertex& x = add(e, count, origin(count), false);
@@ -179,7 +184,8 @@ class RecordedPath {
   const BlurredAreaEmitter* blurred() const { return std::get_if<BlurredAreaEmitter>(&emitter()); }
   /// The ray that leaves the last vertex.
   Ray<double> last_ray() const {
-    return {path_.origin(path_.count), path_.count == 0 ? path_.v0 : vertex(path_.count - 1).wo};
+    return {path_.origin(path_.count),
+            path_.count == 0 ? path_.departure : vertex(path_.count - 1).wo};
   }
   Vec3d connection_point() const {
     return topology_.end == PathEnd::AreaConnection ? path_.end : position_of(emitter());

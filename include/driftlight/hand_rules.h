@@ -32,6 +32,8 @@
 /// Delta lobes:
 ///   thin pane        log 2 R / (1 + R):  dR / (R (1 + R));
 ///                    log (1 - R) / (1 + R):  -2 dR / (1 - R^2)                           (H31)
+///   blend            F = (1 - w) F_1 + w F_2:  dF = (1 - w) F_1 dlog F_1 + w F_2 dlog F_2
+///                    + (F_2 - F_1) dw, of densities and of delta lobes                    (H34)
 ///   mask             w = 1 - o + o p, p of a pane within:  dw = (p - 1) do + o dp        (H32)
 ///   mirror           dv = 2 c dn + 2 n (wi.dn + n.dwi) - dwi                             (H12)
 ///   refraction       v = k n - wi / eta, k = c / eta - s r, r = sqrt(1 - (1 - c^2) / eta^2):
@@ -42,6 +44,9 @@
 ///   sphere           dn = dx' / R                                                        (H16)
 /// Ends:
 ///   camera           log W = -3 log(forward.v):  -3 forward / forward.v . dv             (H17)
+///   orthographic     dx of Camera::origin_differential, and no dv of the ray; a connection to it
+///   has
+///                    dw = 0 and the constant W / spread                                  (H33)
 ///   connection       w = e / r, e = y - x:  dw = (I - w w^T) de / r, d log r^2 = 2 w.de / r
 ///                    log cos_y, cos_y = -n_y.w:  d = -(n_y.dw + w.dn_y) / cos_y          (H18)
 ///   spot             log falloff(-w):  -(d falloff / dv)(-w) / falloff . dw              (H23)
@@ -93,7 +98,7 @@ struct SurfaceDifferential {
   }
 };
 
-/// The rules (H2) to (H18), (H23) to (H32). A class, so that a test can replace single ones by
+/// The rules (H2) to (H18), (H23) to (H34). A class, so that a test can replace single ones by
 /// wrong ones.
 struct HandRules {
   // ---- Microfacets ----
@@ -364,6 +369,53 @@ struct HandRules {
     return f;
   }
 
+  /// (H34) from the values and the partials of both.
+  static FactorPartials blend(const Blend& b, const Vec2d& uv, const ScaledColor<double>& f1,
+                              const FactorPartials& partials1, const ScaledColor<double>& f2,
+                              const FactorPartials& partials2) {
+    FactorPartials f;
+    const double w = b.weight.eval(uv)[0];
+    const bool has_first = f1.color.maxCoeff() > 0.0;
+    const bool has_second = f2.color.maxCoeff() > 0.0;
+    double unit = has_first ? f1.log_scale : f2.log_scale;
+    if (has_second) unit = std::max(unit, f2.log_scale);
+    Rgbd first = Rgbd::Zero();
+    Rgbd second = Rgbd::Zero();
+    if (has_first) first = std::exp(f1.log_scale - unit) * f1.color;
+    if (has_second) second = std::exp(f2.log_scale - unit) * f2.color;
+    f.color = (1.0 - w) * first + w * second;
+    const auto by = [&](const FactorPartials::Lanes& by1, const FactorPartials::Lanes& by2,
+                        double d_w) {
+      Rgbd slope = d_w * (second - first);
+      // What has no value may have no slope either.
+      if (has_first) slope += (1.0 - w) * first * (by1.head<3>() + by1[3]);
+      if (has_second) slope += w * second * (by2.head<3>() + by2[3]);
+      FactorPartials::Lanes lanes;
+      lanes << log_slope(slope, f.color), 0.0;
+      return lanes;
+    };
+    const Texture::Slopes slopes = b.weight.slopes(uv);
+    f.cos_i = by(partials1.cos_i, partials2.cos_i, 0.0);
+    f.cos_o = by(partials1.cos_o, partials2.cos_o, 0.0);
+    f.io = by(partials1.io, partials2.io, 0.0);
+    f.u = by(partials1.u, partials2.u, slopes.u[0]);
+    f.v = by(partials1.v, partials2.v, slopes.v[0]);
+    return f;
+  }
+  /// Values are those of any directions with these cosines, n = z.
+  static FactorPartials scatter(const Blend& b, double cos_i, double cos_o, double io,
+                                const Vec2d& uv, Scattering scattering) {
+    const double sin_i = std::sqrt(std::max(0.0, 1.0 - cos_i * cos_i));
+    const double x = sin_i > 0.0 ? (io - cos_i * cos_o) / sin_i : 0.0;
+    const Vec3d wi(sin_i, 0.0, cos_i);
+    const Vec3d wo(x, std::sqrt(std::max(0.0, 1.0 - cos_o * cos_o - x * x)), cos_o);
+    const SurfacePoint<double> at{Vec3d::UnitZ(), uv};
+    const Bsdf& first = b.first->bsdf;
+    const Bsdf& second = b.second->bsdf;
+    return blend(b, uv, eval(first, at, wi, wo), scatter(first, cos_i, cos_o, io, uv, scattering),
+                 eval(second, at, wi, wo), scatter(second, cos_i, cos_o, io, uv, scattering));
+  }
+
   static FactorPartials scatter(const Bsdf& bsdf, double cos_i, double cos_o, double io,
                                 const Vec2d& uv, Scattering scattering) {
     return std::visit([&](const auto& b) { return scatter(b, cos_i, cos_o, io, uv, scattering); },
@@ -443,6 +495,16 @@ struct HandRules {
     f.u.head<3>() = log_slope(d_u, f.color);
     f.v.head<3>() = log_slope(d_v, f.color);
     return f;
+  }
+  /// (H34)
+  static FactorPartials delta_lobe(const Blend& b, double cos_i, const Vec2d& uv,
+                                   Scattering scattering) {
+    const Vec3d wi(std::sqrt(std::max(0.0, 1.0 - cos_i * cos_i)), 0.0, cos_i);
+    const SurfacePoint<double> at{Vec3d::UnitZ(), uv};
+    const Bsdf& first = b.first->bsdf;
+    const Bsdf& second = b.second->bsdf;
+    return blend(b, uv, eval_delta(first, at, wi, scattering), delta(first, cos_i, uv, scattering),
+                 eval_delta(second, at, wi, scattering), delta(second, cos_i, uv, scattering));
   }
   /// Those that have no delta lobe.
   template <class B>
@@ -596,8 +658,13 @@ struct HandRules {
   // ---- Ends ----
 
   /// (H17): gradient of log W by v.
-  static Vec3d camera(const PerspectiveCamera& camera, const Vec3d& v) {
+  static Vec3d camera(const Camera& camera, const Vec3d& v) {
     return -3.0 / camera.cosine(v) * camera.forward;
+  }
+
+  /// (H33): the derivative by v, from that by the origin of its ray.
+  static Vec3d parallel_camera(const Camera& camera, const Vec3d& v, const Vec3d& x_bar) {
+    return camera.origin_adjoint(v, x_bar);
   }
 
   /// (H18): the transpose of (I - w w^T) / r at w_bar, plus the gradient of -log r^2, by e.

@@ -121,8 +121,16 @@ class StageSweep : RecordedPath<Rules> {
 
   void begin_at_sensor() {
     film(block_columns());
-    close(Stage::Kind::Free, true);
-    take_direction();
+    const Camera& camera = scene_.camera();
+    if (!camera.is_orthographic()) {
+      close(Stage::Kind::Free, true);
+      take_direction();
+      return;
+    }
+    close(Stage::Kind::Point, true);
+    ray_.xi_t = camera.origin_differential(path_.v0, chart_.block(block_).t);
+    ray_.xi_b = camera.origin_differential(path_.v0, chart_.block(block_).b);
+    ++block_;
   }
 
   Arrival arrive(const Vertex& x) const {
@@ -217,6 +225,16 @@ class StageSweep : RecordedPath<Rules> {
   /// Both ends of the joining edge, whose columns are those of both sides: (H18).
   void join(const Arrival& x, const Arrival& y) {
     const Vertex& at = this->light_end();
+    if (path_.count == 0 && scene_.camera().is_orthographic()) {
+      // dv of the coordinate: (I - v v^T) dx / (a |v / (forward.v)|) of what is across the rays.
+      const Vec3d& v = path_.v0;
+      const Vec3d& forward = scene_.camera().forward;
+      const Columns across = y.dx - outer(forward, dot(forward, y.dx));
+      film(scene_.camera().cosine(v) / scene_.camera().scale * (across - outer(v, dot(v, across))));
+      position(*at.shape, y.dx);
+      residuals(at, y.dwi, Columns::zero(), y.dn);
+      return;
+    }
     const Vec3d w = -at.wo;
     const double r = (at.p - this->sensor_end()).norm();
     const Columns de = y.dx - x.dx;
@@ -282,7 +300,7 @@ class StageSweep : RecordedPath<Rules> {
 
   /// (H22)
   void film(const Columns& dv) {
-    const PerspectiveCamera& camera = scene_.camera();
+    const Camera& camera = scene_.camera();
     const Vec3d& v = path_.v0;
     const double f = camera.cosine(v);
     const double factor = std::sqrt(12.0) / 3.0;
@@ -300,16 +318,12 @@ class StageSweep : RecordedPath<Rules> {
   }
 
   void residuals(const Vertex& x, const Columns& dwi, const Columns& dwo, const Columns& dn) {
-    residuals(*x.bsdf, x, dwi, dwo, dn);
-  }
-  void residuals(const Bsdf& bsdf, const Vertex& x, const Columns& dwi, const Columns& dwo,
-                 const Columns& dn) {
-    std::visit([&](const auto& b) { constrain(b, x, dwi, dwo, dn); }, bsdf);
+    constrain(*x.bsdf, x, dwi, dwo, dn, 1.0);
   }
 
   /// (H19)
   void slopes(const Microfacets& microfacets, double e, const Vertex& x, const Columns& dwi,
-              const Columns& dwo, const Columns& dn, double share = 1.0) {
+              const Columns& dwo, const Columns& dn, double share) {
     const double hn = x.cos_i + e * x.cos_o;
     const Vec3d m = (x.wi + e * x.wo) / hn;
     const double s2 = (m - x.n_s).squaredNorm();
@@ -329,58 +343,72 @@ class StageSweep : RecordedPath<Rules> {
     add(factor, dv - cosine * dn - outer(n, d_cos));
   }
 
+  // `share` is that of the BSDF in a blend.
+
+  void constrain(const Bsdf& bsdf, const Vertex& x, const Columns& dwi, const Columns& dwo,
+                 const Columns& dn, double share) {
+    std::visit([&](const auto& b) { constrain(b, x, dwi, dwo, dn, share); }, bsdf);
+  }
   void constrain(const Diffuse&, const Vertex& x, const Columns&, const Columns& dwo,
-                 const Columns& dn) {
-    diffuse(x, dwo, dn, 1.0);
+                 const Columns& dn, double share) {
+    diffuse(x, dwo, dn, share);
   }
-  void constrain(const Conductor&, const Vertex&, const Columns&, const Columns&, const Columns&) {}
-  void constrain(const Dielectric&, const Vertex&, const Columns&, const Columns&, const Columns&) {
-  }
+  void constrain(const Conductor&, const Vertex&, const Columns&, const Columns&, const Columns&,
+                 double) {}
+  void constrain(const Dielectric&, const Vertex&, const Columns&, const Columns&, const Columns&,
+                 double) {}
   void constrain(const RoughConductor& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
-                 const Columns& dn) {
-    slopes(b.microfacets, 1.0, x, dwi, dwo, dn);
+                 const Columns& dn, double share) {
+    slopes(b.microfacets, 1.0, x, dwi, dwo, dn, share);
   }
   void constrain(const RoughDielectric& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
-                 const Columns& dn) {
+                 const Columns& dn, double share) {
     const double eta = x.cos_i > 0.0 ? b.eta : 1.0 / b.eta;
-    slopes(b.microfacets, x.scattering == Scattering::Reflection ? 1.0 : eta, x, dwi, dwo, dn);
+    slopes(b.microfacets, x.scattering == Scattering::Reflection ? 1.0 : eta, x, dwi, dwo, dn,
+           share);
   }
   /// (H21)
   void constrain(const Phong& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
-                 const Columns& dn) {
+                 const Columns& dn, double share) {
     const double lobe = detail::phong_lobe(b, 2.0 * x.cos_i * x.cos_o - x.io);
     const double glossy = luminance(b.specular_reflectance.eval(x.uv)) * lobe;
     const double matt = luminance(b.diffuse_reflectance.eval(x.uv)) * kInvPi;
     if (!(glossy + matt > 0.0)) return;
-    const double share = glossy / (glossy + matt);
-    if (share > 0.0) {
+    const double part = glossy / (glossy + matt);
+    if (part > 0.0) {
       const LocalRow d_cos = dot(x.wi, dn) + dot(x.n_s, dwi);
       const Columns mirror = 2.0 * x.cos_i * dn + outer(x.n_s, 2.0 * d_cos) - dwi;
-      add(std::sqrt(share * b.exponent) / 3.0, dwo - mirror);
+      add(std::sqrt(share * part * b.exponent) / 3.0, dwo - mirror);
     }
-    if (share < 1.0) diffuse(x, dwo, dn, 1.0 - share);
+    if (part < 1.0) diffuse(x, dwo, dn, share * (1.0 - part));
   }
 
   void constrain(const ThinDielectric&, const Vertex&, const Columns&, const Columns&,
-                 const Columns&) {}
+                 const Columns&, double) {}
   void constrain(const Plastic&, const Vertex& x, const Columns&, const Columns& dwo,
-                 const Columns& dn) {
-    diffuse(x, dwo, dn, 1.0);
+                 const Columns& dn, double share) {
+    diffuse(x, dwo, dn, share);
   }
   /// (H21) with (H19) in the place of the mirror direction
   void constrain(const RoughPlastic& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
-                 const Columns& dn) {
-    const auto part = detail::rough_plastic_parts(b, x.cos_i, x.cos_o, x.io);
-    const double glossy = luminance(b.specular_reflectance.eval(x.uv)) * part.specular;
-    const double matt = luminance(b.base.albedo(x.uv)) * part.diffuse;
+                 const Columns& dn, double share) {
+    const auto parts = detail::rough_plastic_parts(b, x.cos_i, x.cos_o, x.io);
+    const double glossy = luminance(b.specular_reflectance.eval(x.uv)) * parts.specular;
+    const double matt = luminance(b.base.albedo(x.uv)) * parts.diffuse;
     if (!(glossy + matt > 0.0)) return;
-    const double share = glossy / (glossy + matt);
-    if (share > 0.0) slopes(b.microfacets, 1.0, x, dwi, dwo, dn, share);
-    if (share < 1.0) diffuse(x, dwo, dn, 1.0 - share);
+    const double coat = glossy / (glossy + matt);
+    if (coat > 0.0) slopes(b.microfacets, 1.0, x, dwi, dwo, dn, share * coat);
+    if (coat < 1.0) diffuse(x, dwo, dn, share * (1.0 - coat));
   }
   void constrain(const Mask& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
-                 const Columns& dn) {
-    if (b.nested != nullptr) residuals(b.nested->bsdf, x, dwi, dwo, dn);
+                 const Columns& dn, double share) {
+    if (b.nested != nullptr) constrain(b.nested->bsdf, x, dwi, dwo, dn, share);
+  }
+  void constrain(const Blend& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
+                 const Columns& dn, double share) {
+    const auto of = detail::blend_shares<double>(b, {x.n_s, x.uv}, x.wi, x.wo);
+    if (of.first > 0.0) constrain(b.first->bsdf, x, dwi, dwo, dn, share * of.first);
+    if (of.second > 0.0) constrain(b.second->bsdf, x, dwi, dwo, dn, share * of.second);
   }
 
   /// w_o = e / r with e = y - x: (H18)

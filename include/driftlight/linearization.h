@@ -39,9 +39,10 @@ struct LocalColumns {
 inline constexpr LocalColumns kSensorColumns{.xi = 0, .omega = 2, .u = 4};
 inline constexpr LocalColumns kLightColumns{.xi = 4, .omega = 6, .u = 0};
 
-/// Most residuals of a path: two of the film, three of each position, six of each scattering (two
-/// lobes), three of the environment or of a spot, two of the aperture of each segment.
-inline constexpr int kMaxResiduals = 2 + 9 * kMaxPathLength + 3 + 2 * kMaxPathLength;
+/// Most residuals of a path: two of the film, three of each position, three of each lobe of each
+/// scattering, three of the environment or of a spot, two of the aperture of each segment.
+inline constexpr int kMaxResiduals =
+    2 + (3 + 3 * kMaxLobes) * kMaxPathLength + 3 + 2 * kMaxPathLength;
 
 /// The sensor (stage 0), a scattering vertex, or the end of a path that hits an emitter or leaves
 /// the scene; of the light side the emitter (a point there, then emission) or a scattering vertex.
@@ -50,7 +51,8 @@ struct Stage {
     Free,      ///< takes a block of coordinates, and is followed by another stage
     Delta,     ///< no block of its own; followed by another stage
     Terminal,  ///< the last one, with a block (an emitter point) or without
-    Point,     ///< the first of a light side: its block is xi of the next
+    Point,     ///< the first of a light side or at an orthographic sensor: its block is xi of the
+               ///< next
   };
   using Map = Eigen::Matrix<double, 2, 4, Eigen::RowMajor>;
 

@@ -99,8 +99,8 @@ struct PathTopology {
 };
 
 /// The coordinates of a path, one block of two dimensions after the other: the unit directions v_k
-/// that are free, in order from the sensor; with PathEnd::AreaConnection the last block is the
-/// position of the emitter point instead.
+/// that are free, in order from the sensor, v_0 the coordinate of the first ray (sensor.h); with
+/// PathEnd::AreaConnection the last block is the position of the emitter point instead.
 ///
 /// With a light side: the free directions on the sensor's side but that of the joining edge; then
 /// those of the light side, all along the light:

@@ -59,7 +59,7 @@ class Scene {
   Scene(Scene&&) noexcept;
   Scene& operator=(Scene&&) noexcept;
 
-  const PerspectiveCamera& camera() const { return camera_; }
+  const Camera& camera() const { return camera_; }
   std::span<const Shape> shapes() const { return surfaces_->shapes; }
   std::span<const Material> materials() const { return surfaces_->materials; }
   std::span<const Bsdf> bsdfs() const { return surfaces_->bsdfs; }
@@ -131,7 +131,7 @@ class Scene {
   Scene();
   void choose_emitters_by_power();
 
-  PerspectiveCamera camera_;
+  Camera camera_;
   std::shared_ptr<Surfaces> surfaces_;
   std::vector<Emitter> emitters_;
   std::optional<std::uint32_t> environment_;
@@ -144,6 +144,7 @@ class Scene {
 /// Collects the parts of a scene. Indices are returned in order from 0.
 class SceneBuilder {
  public:
+  /// Throws InputError if it has more than kMaxLobes lobes.
   std::uint32_t add_bsdf(Bsdf bsdf);
   std::uint32_t add_material(const Material& material);
   /// With `radiance` the shape is an area emitter. Throws InputError on an empty mesh or one whose
@@ -155,7 +156,7 @@ class SceneBuilder {
   void add_emitter(DirectionalEmitter emitter);
   /// A ConstantEnvironment or EnvironmentMap. Throws InputError on a second one.
   void set_environment(Emitter environment);
-  void set_camera(const PerspectiveCamera& camera);
+  void set_camera(const Camera& camera);
 
   /// Throws InputError if there is no emitter or no light. The builder is empty afterwards.
   Scene build();

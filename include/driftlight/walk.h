@@ -26,8 +26,8 @@ struct ScatterEvent {
 /// Does nothing; visitors derive from it and hide what they want to see.
 template <Scalar T>
 struct WalkVisitor {
-  /// The first direction.
-  void sensor(const PerspectiveCamera&, const Vec3<T>& /*v*/) {}
+  /// The coordinate of the first ray (sensor.h): its direction, from a pinhole.
+  void sensor(const Camera&, const Vec3<T>& /*v*/) {}
   /// A vertex on a surface, before the scattering there is visited; also the last one of
   /// PathEnd::Hit and PathEnd::AreaConnection.
   void position(const Shape&, const Vec3<T>& /*p*/) {}
@@ -38,6 +38,9 @@ struct WalkVisitor {
   /// The ray that leaves the sensor or a vertex, for a visitor that changes its derivatives (never
   /// its value). `normal` is the geometric one of the surface left; the optical axis at the sensor.
   void depart(Ray<T>& /*ray*/, const Vec3<T>& /*normal*/) {}
+  /// In the place of `depart` at an orthographic sensor: coordinates move the origin of the ray
+  /// alone.
+  void depart_parallel(Ray<T>& /*ray*/) {}
   /// Scattering into the edge that connects to an emitter point.
   void connect(const ScatterEvent<T>&) {}
   /// The ends. `cosine` is that of the emitter's normal and `r2` the squared length of the edge.
@@ -69,7 +72,7 @@ struct WalkVisitor {
   void light_delta(const ScatterEvent<T>&) {}
   /// Scattering from the light into the joining edge.
   void light_connect(const ScatterEvent<T>&) {}
-  /// The joining edge has this squared length.
+  /// The joining edge has this squared length; to the sensor, this Camera::spread.
   void joined(const T& /*r2*/) {}
   /// The events to come are at vertex k, 0 is x_1.
   void vertex(int /*k*/) {}
@@ -134,6 +137,18 @@ Vec3<T> normal_at_end(const Blocks& blocks, const Shape& shape, const Vec3<T>& y
     return emitter_normal(shape, y);
 }
 
+/// The ray that leaves the sensor, v its coordinate.
+template <Scalar T, class Visitor>
+Ray<T> leave_sensor(const Camera& camera, const Vec3<T>& v, Visitor& visitor) {
+  visitor.sensor(camera, v);
+  Ray<T> ray = camera.ray(v);
+  if (camera.is_orthographic())
+    visitor.depart_parallel(ray);
+  else
+    visitor.depart(ray, constant<T>(camera.forward));
+  return ray;
+}
+
 /// The walk along a path with a light side.
 template <Scalar T, class Blocks, class Visitor>
 class TwoSidedWalk {
@@ -156,10 +171,7 @@ class TwoSidedWalk {
   const PathVertex& vertex(int k) const { return topology_.vertices[static_cast<std::size_t>(k)]; }
 
   WalkVertex<T> camera_side() {
-    const PerspectiveCamera& camera = scene_.camera();
-    Ray<T> ray{constant<T>(camera.origin), blocks_(next_block_++)};
-    visitor_.sensor(camera, ray.direction);
-    visitor_.depart(ray, constant<T>(camera.forward));
+    Ray<T> ray = leave_sensor<T>(scene_.camera(), blocks_(next_block_++), visitor_);
     const int last = topology_.camera_count() - 1;
     for (int k = 0; k < last; ++k) {
       const WalkVertex<T> x = arrive(scene_, vertex(k), ray);
@@ -242,10 +254,11 @@ class TwoSidedWalk {
     visitor_.connect(x.event(x.w, edge_));
     join_light(y, r2);
   }
-  void join(const PerspectiveCamera& camera, const WalkVertex<T>& y) {
-    const T r2 = aim(constant<T>(camera.origin), y.at.p);
-    visitor_.sensor(camera, edge_);
-    join_light(y, r2);
+  void join(const Camera& camera, const WalkVertex<T>& y) {
+    const Vec3<T> v = camera.coordinate(y.at.p);
+    visitor_.sensor(camera, v);
+    edge_ = camera.ray(v).direction;
+    join_light(y, camera.spread(v, y.at.p));
   }
   /// Sets the unit direction of the joining edge; its squared length.
   T aim(const Vec3<T>& from, const Vec3<T>& to) {
@@ -284,10 +297,7 @@ void walk(const Scene& scene, const PathTopology& topology, const Blocks& blocks
   if (topology.has_light_side())
     return TwoSidedWalk<T, Blocks, Visitor>(scene, topology, blocks, visitor).run();
   using std::sqrt;
-  const PerspectiveCamera& camera = scene.camera();
-  Ray<T> ray{constant<T>(camera.origin), blocks(0)};
-  visitor.sensor(camera, ray.direction);
-  visitor.depart(ray, constant<T>(camera.forward));
+  Ray<T> ray = leave_sensor<T>(scene.camera(), blocks(0), visitor);
   int next_block = 1;
   for (int k = 0; k < topology.scatter_count; ++k) {
     const WalkVertex<T> x = arrive(scene, topology.vertices[static_cast<std::size_t>(k)], ray);

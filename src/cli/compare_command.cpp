@@ -35,8 +35,7 @@ namespace {
 constexpr double kShownMean = 0.12;
 
 /// Throws InputError if it cannot be read or is not of the scene's size.
-std::optional<Image> read_reference(const CompareCommand& command,
-                                    const PerspectiveCamera& camera) {
+std::optional<Image> read_reference(const CompareCommand& command, const Camera& camera) {
   if (!command.reference) return std::nullopt;
   Image image = read_image(*command.reference);
   if (image.width != camera.film_width || image.height != camera.film_height)

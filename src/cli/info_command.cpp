@@ -79,7 +79,11 @@ std::string list_textures(std::span<const Bsdf> bsdfs) {
 }
 
 /// Field of view across the film, and where the camera is.
-std::string describe_camera(const PerspectiveCamera& camera) {
+std::string describe_camera(const Camera& camera) {
+  if (camera.is_orthographic())
+    return fmt::format("orthographic, {:.4g} across, at ({:.4g}, {:.4g}, {:.4g})",
+                       2.0 * camera.half_width * camera.scale, camera.origin.x(), camera.origin.y(),
+                       camera.origin.z());
   const double degrees = 360.0 * kInvPi * std::atan(camera.half_width);
   return fmt::format("perspective, {:.4g} degrees across, at ({:.4g}, {:.4g}, {:.4g})", degrees,
                      camera.origin.x(), camera.origin.y(), camera.origin.z());
@@ -121,9 +125,10 @@ std::string describe_integrator(std::string_view name, std::string_view method) 
 void run(const InfoCommand& command) {
   const LoadedScene loaded = load_scene(command.scene.file, {.defines = command.scene.defines});
   const Scene& scene = loaded.scene;
-  constexpr std::array<std::string_view, 10> kBsdfs{
-      "diffuse", "conductor", "roughconductor", "dielectric",     "roughdielectric",
-      "phong",   "plastic",   "roughplastic",   "thindielectric", "mask"};
+  constexpr std::array<std::string_view, 11> kBsdfs{
+      "diffuse",         "conductor", "roughconductor", "dielectric",
+      "roughdielectric", "phong",     "plastic",        "roughplastic",
+      "thindielectric",  "mask",      "blend"};
   constexpr std::array<std::string_view, 7> kEmitters{
       "area", "point", "constant", "envmap", "spot", "directional", "blurred area"};
   std::string text = row("scene", command.scene.file.string());

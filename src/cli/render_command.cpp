@@ -129,7 +129,7 @@ void run(const RenderCommand& command) {
   how.stop = &stop_on_interrupt();
   std::optional<StepLayers> layers;
   if (command.layers) {
-    const PerspectiveCamera& camera = loaded.scene.camera();
+    const Camera& camera = loaded.scene.camera();
     how.layers = &layers.emplace(camera.film_width, camera.film_height);
   }
   Layers strategies;

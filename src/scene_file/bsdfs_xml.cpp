@@ -3,6 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "bsdf_textures.h"
 #include "color_xml.h"
@@ -168,6 +172,10 @@ Bsdf read_thin_dielectric(Properties& properties, LoadContext& context) {
 
 Bsdf read_null(Properties&, LoadContext&) { return Mask{Texture(Rgbd::Zero()), nullptr}; }
 
+std::shared_ptr<const BsdfBox> boxed(const Bsdf& bsdf) {
+  return std::make_shared<const BsdfBox>(BsdfBox{bsdf});
+}
+
 /// Each side masks its own BSDF. Black back sides let pass too.
 Surface read_mask(Properties& properties, LoadContext& context) {
   const std::vector<Element> nested = properties.nested({"bsdf", "ref"});
@@ -177,15 +185,109 @@ Surface read_mask(Properties& properties, LoadContext& context) {
     nested.front().fail("a smooth dielectric cannot be nested in a mask: a thindielectric can");
   const Texture opacity = read_textured(properties, "opacity", Rgbd::Constant(0.5), context);
   if (opacity.maximum() > 1.0) properties.fail("opacity", "must be between 0 and 1");
-  const auto masked = [&](const Bsdf& bsdf) {
-    return Mask{opacity, std::make_shared<const BsdfBox>(BsdfBox{bsdf})};
-  };
+  const auto masked = [&](const Bsdf& bsdf) { return Mask{opacity, boxed(bsdf)}; };
   Surface result{masked(surface->front), std::nullopt, std::nullopt};
   if (surface->back)
     result.back = masked(*surface->back);
   else if (!is_transmissive(surface->front))
     result.back = Mask{opacity, nullptr};
   return result;
+}
+
+/// Blends each side. A side that only one of the two has is black in the other.
+Surface blend(const Element& element, const Texture& weight, const Surface& first,
+              const Surface& second) {
+  const bool transmits = is_transmissive(first.front) || is_transmissive(second.front);
+  if (transmits && (first.back || second.back))
+    element.fail("what transmits cannot be blended with what is twosided or a mask");
+  const auto through = [](const Surface& s) {
+    return has_delta(s.front, Scattering::Transmission);
+  };
+  if (through(first) && through(second) && delta_eta(first.front) != delta_eta(second.front))
+    element.fail("smooth bsdfs that refract differently cannot be blended");
+  Surface result{Blend{weight, boxed(first.front), boxed(second.front)}, std::nullopt,
+                 std::nullopt};
+  const Bsdf black = Diffuse{Texture(Rgbd::Zero())};
+  if (first.back || second.back)
+    result.back =
+        Blend{weight, boxed(first.back.value_or(black)), boxed(second.back.value_or(black))};
+  const int lobes = std::max(lobe_count(result.front), result.back ? lobe_count(*result.back) : 0);
+  if (lobes > kMaxLobes)
+    element.fail("a blend of " + std::to_string(lobes) +
+                 " diffuse and glossy lobes; the limit is " + std::to_string(kMaxLobes));
+  return result;
+}
+
+/// One number from the colours of a texture: their mean in Mitsuba 0.6, their luminance in 3.
+Texture read_weight(Properties& properties, LoadContext& context) {
+  if (!properties.has("weight")) properties.element().fail("a blendbsdf needs a 'weight'");
+  Texture texture = read_textured(properties, "weight", Rgbd::Zero(), context);
+  if (texture.maximum() > 1.0) properties.fail("weight", "must be between 0 and 1");
+  const bool newer = properties.dialect() == Dialect::Mitsuba3;
+  const Rgbd factors = newer ? kLuminance : Rgbd::Constant(1.0 / 3.0);
+  const auto gray = [&](const Rgbd& color) {
+    return Rgbd(Rgbd::Constant((factors * texture.scale * color).sum()));
+  };
+  texture.color = Rgbd::Constant((factors * texture.color).sum());
+  if (texture.pattern) {
+    texture.pattern->color0 = gray(texture.pattern->color0);
+    texture.pattern->color1 = gray(texture.pattern->color1);
+  }
+  if (texture.bitmap != nullptr) {
+    Bitmap bitmap = *texture.bitmap;
+    for (Eigen::Array3f& texel : bitmap.texels)
+      texel = gray(texel.cast<double>()).cast<float>().min(1.0F);
+    texture.bitmap = std::make_shared<const Bitmap>(std::move(bitmap));
+  }
+  texture.scale = kWhite;
+  return texture;
+}
+
+Surface read_blend(Properties& properties, LoadContext& context) {
+  const Texture weight = read_weight(properties, context);
+  const std::vector<Element> nested = properties.nested({"bsdf", "ref"});
+  if (nested.size() != 2) properties.element().fail("a blendbsdf needs two nested bsdfs");
+  const std::shared_ptr<Surface> first = read_surface(nested[0], context);
+  const std::shared_ptr<Surface> second = read_surface(nested[1], context);
+  return blend(properties.element(), weight, *first, *second);
+}
+
+/// sum_i w_i f_i, one blend after the other; black where the weights sum to less than 1.
+Surface read_mixture(Properties& properties, LoadContext& context) {
+  std::vector<double> weights;
+  for (const std::string& part : split_list(properties.required_text("weights"))) {
+    const std::optional<double> weight = parse_number(part);
+    if (!weight || !(*weight >= 0.0))
+      properties.fail("weights", "'" + part + "' is not a number that is at least 0");
+    weights.push_back(*weight);
+  }
+  const std::vector<Element> nested = properties.nested({"bsdf", "ref"});
+  if (nested.empty() || nested.size() != weights.size())
+    properties.fail("weights", std::to_string(weights.size()) + " weights for " +
+                                   std::to_string(nested.size()) + " nested bsdfs");
+  double sum = 0;
+  for (const double weight : weights) sum += weight;
+  if (!(sum > 0.0)) properties.fail("weights", "must not all be 0");
+  if (sum > 1.0 && properties.boolean("ensureEnergyConservation", true)) {
+    context.notice(properties.element(),
+                   "the weights of " + properties.description() + " are scaled to a sum of 1");
+    for (double& weight : weights) weight /= sum;
+    sum = 1.0;
+  }
+  if (sum > 1.0 + 1e-9) properties.fail("weights", "must not sum to more than 1");
+  const auto mix = [&](const Surface& first, const Surface& second, double weight) {
+    return blend(properties.element(), Texture(Rgbd::Constant(weight)), first, second);
+  };
+  Surface result = *read_surface(nested[0], context);
+  result.material.reset();
+  double so_far = weights[0];
+  for (std::size_t i = 1; i < nested.size(); ++i) {
+    const std::shared_ptr<Surface> next = read_surface(nested[i], context);
+    so_far += weights[i];
+    result = mix(result, *next, so_far > 0.0 ? weights[i] / so_far : 0.0);
+  }
+  const Surface black{Diffuse{Texture(Rgbd::Zero())}, std::nullopt, std::nullopt};
+  return sum < 1.0 - 1e-9 ? mix(result, black, 1.0 - sum) : result;
 }
 
 Surface read_two_sided(Properties& properties, LoadContext& context) {
@@ -210,7 +312,7 @@ Surface one_sided(Properties& properties, LoadContext& context) {
 }
 
 using BsdfReader = Surface (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, BsdfReader>, 12> kBsdfs{{
+constexpr std::array<std::pair<std::string_view, BsdfReader>, 14> kBsdfs{{
     {"diffuse", &one_sided<read_diffuse>},
     {"conductor", &one_sided<read_conductor>},
     {"roughconductor", &one_sided<read_rough_conductor>},
@@ -222,6 +324,8 @@ constexpr std::array<std::pair<std::string_view, BsdfReader>, 12> kBsdfs{{
     {"thindielectric", &one_sided<read_thin_dielectric>},
     {"null", &one_sided<read_null>},
     {"mask", &read_mask},
+    {"blendbsdf", &read_blend},
+    {"mixturebsdf", &read_mixture},
     {"twosided", &read_two_sided},
 }};
 

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "color_xml.h"
+#include "daylight.h"
 #include "properties.h"
 #include "textures_xml.h"
 
@@ -85,17 +86,153 @@ void read_environment_map(Properties& properties, LoadContext& context) {
   });
 }
 
+// ---- Daylight ---------------------------------------------------------------------------------
+
+constexpr std::array<std::string_view, 9> kPlaceAndTime{
+    "latitude", "longitude", "timezone", "year", "month", "day", "hour", "minute", "second"};
+
+PlaceAndTime read_place_and_time(Properties& properties) {
+  PlaceAndTime at;
+  at.latitude = properties.number("latitude", at.latitude);
+  at.longitude = properties.number("longitude", at.longitude);
+  at.timezone = properties.number("timezone", at.timezone);
+  at.year = properties.integer("year", at.year);
+  at.month = properties.integer("month", at.month);
+  at.day = properties.integer("day", at.day);
+  at.hour = properties.number("hour", at.hour);
+  at.minute = properties.number("minute", at.minute);
+  at.second = properties.number("second", at.second);
+  if (at.year < 1 || at.year > 9999) properties.fail("year", "must be between 1 and 9999");
+  if (at.month < 1 || at.month > 12) properties.fail("month", "must be between 1 and 12");
+  if (at.day < 1 || at.day > 31) properties.fail("day", "must be between 1 and 31");
+  return at;
+}
+
+/// From the space of environment maps, y up, to that of daylight plugins: Mitsuba 3 has z up, and
+/// azimuths from x over y.
+Eigen::Matrix3d daylight_axes(Dialect dialect) {
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  if (dialect == Dialect::Mitsuba3) axes << 0, 0, -1, 1, 0, 0, 0, 1, 0;
+  return axes;
+}
+
+/// By its direction in the world, or by place and time.
+SunPosition read_sun_position(Properties& properties, const Eigen::Matrix3d& to_world) {
+  const std::optional<Vec3d> direction = properties.vector("sunDirection");
+  SunPosition sun;
+  if (direction) {
+    for (const std::string_view name : kPlaceAndTime)
+      if (properties.has(name))
+        properties.fail(name, "give either 'sunDirection' or a place and a time");
+    if (direction->isZero(0.0)) properties.fail("sunDirection", "must not be zero");
+    sun = position_of_sun(to_world.transpose() * *direction);
+  } else {
+    sun = sun_position(read_place_and_time(properties));
+  }
+  if (sun.zenith > 0.5 * kPi)
+    properties.element().fail(
+        fmt::format("the sun is {:.3g} degrees below the horizon", sun.zenith * 180.0 / kPi - 90));
+  return sun;
+}
+
+double read_turbidity(Properties& properties, LoadContext& context) {
+  constexpr double kLeastTurbidity = 2.0;
+  const double turbidity = properties.number("turbidity", 3.0);
+  if (!(turbidity >= 1.0 && turbidity <= 10.0))
+    properties.fail("turbidity", "must be between 1 and 10");
+  if (turbidity < kLeastTurbidity)
+    context.notice(properties.element(), "turbidity is raised to 2, the least of Preetham's model");
+  return std::max(turbidity, kLeastTurbidity);
+}
+
+/// The angular radius of the sun; 0: a directional emitter.
+double read_sun_radius(Properties& properties) {
+  if (properties.has("sunAperture")) {
+    const double aperture = properties.positive("sunAperture", 0.5358);
+    if (!(aperture < 180.0)) properties.fail("sunAperture", "must be below 180 degrees");
+    return 0.5 * aperture * kPi / 180.0;
+  }
+  const double radius = kSunRadius * properties.non_negative("sunRadiusScale", 1.0);
+  if (!(radius < 0.5 * kPi)) properties.fail("sunRadiusScale", "makes a sun of over 180 degrees");
+  return radius;
+}
+
+int read_daylight_resolution(Properties& properties, bool has_sun) {
+  // In Mitsuba 3 there is no map that the sun would have to be seen on.
+  const bool fine = has_sun && properties.dialect() == Dialect::Mitsuba3;
+  const int width = properties.integer("resolution", fine ? 2048 : 512);
+  if (width < 8 || width > 16384) properties.fail("resolution", "must be between 8 and 16384");
+  return width;
+}
+
+/// Both are scaled to nothing where the plugin lacks them.
+void add_daylight(Properties& properties, LoadContext& context, double sky_scale,
+                  double sun_scale) {
+  const Eigen::Matrix3d to_world = read_rotation(properties) * daylight_axes(properties.dialect());
+  const SunPosition sun = read_sun_position(properties, to_world);
+  const double turbidity = read_turbidity(properties, context);
+  DaylightMap how;
+  how.sky_scale = sky_scale;
+  how.sun_scale = sun_scale;
+  how.width = read_daylight_resolution(properties, sun_scale > 0.0);
+  how.stretch = properties.number("stretch", 1.0);
+  if (!(how.stretch >= 1.0 && how.stretch <= 2.0))
+    properties.fail("stretch", "must be between 1 and 2");
+  how.extend = properties.boolean("extend", false);
+  how.sun_radius = read_sun_radius(properties);
+  if (how.sun_radius == 0.0 && sun_scale > 0.0) {
+    how.sun_scale = 0.0;
+    const double solid_angle = 2.0 * kPi * (1.0 - std::cos(kSunRadius));
+    const SunPosition place{how.stretch * sun.zenith, sun.azimuth};
+    context.builder.add_emitter(
+        DirectionalEmitter{-(to_world * sun_direction(place)),
+                           sun_scale * solid_angle * Daylight(turbidity, sun).sun()});
+  }
+  if (how.sky_scale == 0.0 && how.sun_scale == 0.0) return;
+  with_location(properties.element(), [&] {
+    context.builder.set_environment(
+        EnvironmentMap(daylight_map(turbidity, sun, how), to_world, 1.0));
+  });
+}
+
+/// Mitsuba's skies are Hosek and Wilkie's.
+void note_sky(Properties& properties, LoadContext& context) {
+  properties.ignore({"albedo"});
+  context.notice(properties.element(),
+                 "the sky is that of Preetham et al. 1999, not of Hosek and Wilkie 2012; it knows "
+                 "no albedo of the ground");
+}
+
+void read_sky(Properties& properties, LoadContext& context) {
+  note_sky(properties, context);
+  add_daylight(properties, context, properties.non_negative("scale", 1.0), 0.0);
+}
+
+void read_sun(Properties& properties, LoadContext& context) {
+  add_daylight(properties, context, 0.0, properties.non_negative("scale", 1.0));
+}
+
+void read_sun_and_sky(Properties& properties, LoadContext& context) {
+  note_sky(properties, context);
+  if (properties.dialect() == Dialect::Mitsuba3) properties.ignore({"complexSun"});
+  const double sky_scale = properties.non_negative("skyScale", 1.0);
+  add_daylight(properties, context, sky_scale, properties.non_negative("sunScale", 1.0));
+}
+
 void reject_area(Properties& properties, LoadContext&) {
   properties.element().fail("an area emitter must be inside of a shape");
 }
 
 using EmitterReader = void (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, EmitterReader>, 6> kEmitters{{
+constexpr std::array<std::pair<std::string_view, EmitterReader>, 9> kEmitters{{
     {"point", &read_point},
     {"spot", &read_spot},
     {"directional", &read_directional},
     {"constant", &read_constant},
     {"envmap", &read_environment_map},
+    {"sky", &read_sky},
+    {"sun", &read_sun},
+    {"sunsky", &read_sun_and_sky},
     {"area", &reject_area},
 }};
 

@@ -6,7 +6,7 @@
 
 namespace driftlight {
 
-/// An <emitter> outside of shapes: point, constant or envmap. Black ones are left out.
+/// An <emitter> outside of shapes: any plugin but area. Black ones are left out.
 void read_emitter(const Element& element, LoadContext& context);
 
 /// Radiance of an <emitter type="area"> inside of a shape.

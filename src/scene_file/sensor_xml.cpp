@@ -167,35 +167,42 @@ double read_half_width(Properties& sensor, double aspect) {
   return axis == "y" ? half * aspect : half;
 }
 
-/// Mitsuba's cameras look along +z with +y up, which leaves +x on the left of the image.
-void place(PerspectiveCamera& camera, Properties& sensor) {
+/// Mitsuba's cameras look along +z with +y up, which leaves +x on the left of the image. Returns
+/// the lengths of these axes in the world.
+Vec3d place(Camera& camera, Properties& sensor) {
   const Eigen::Affine3d to_world = sensor.transform("toWorld");
   const Eigen::Matrix3d axes = to_world.linear();
-  if (!(axes * axes.transpose()).isIdentity(1e-3))
-    sensor.fail("toWorld", "the transform of a sensor must not scale or shear");
+  const Vec3d lengths = axes.colwise().norm().transpose();
+  if (!(lengths.minCoeff() > 0.0)) sensor.fail("toWorld", "has no inverse");
   camera.origin = to_world.translation();
-  camera.right = -axes.col(0).normalized();
-  camera.up = axes.col(1).normalized();
-  camera.forward = axes.col(2).normalized();
+  camera.right = -axes.col(0) / lengths.x();
+  camera.up = axes.col(1) / lengths.y();
+  camera.forward = axes.col(2) / lengths.z();
+  const Eigen::Matrix3d rotation = axes * lengths.cwiseInverse().asDiagonal();
+  if (!(rotation * rotation.transpose()).isIdentity(1e-3))
+    sensor.fail("toWorld", "the transform of a sensor must not shear");
+  return lengths;
 }
 
 /// Narrows the camera from the whole film to its window.
-void crop(PerspectiveCamera& camera, const FilmSize& film) {
+void crop(Camera& camera, const FilmSize& film) {
   const FilmSize::Crop& window = film.crop;
   camera.film_width = window.width;
   camera.film_height = window.height;
   if (window.width == film.width && window.height == film.height) return;
   const double width = 2.0 * camera.half_width / film.width;  // of a pixel
   const double height = 2.0 * camera.half_height / film.height;
-  camera.center.x() = (window.x + 0.5 * (window.width - film.width)) * width;
-  camera.center.y() = -(window.y + 0.5 * (window.height - film.height)) * height;
+  camera.center.x() += (window.x + 0.5 * (window.width - film.width)) * width;
+  camera.center.y() -= (window.y + 0.5 * (window.height - film.height)) * height;
   camera.half_width = 0.5 * window.width * width;
   camera.half_height = 0.5 * window.height * height;
 }
 
-void reject_shift(Properties& sensor) {
-  for (const std::string_view name : {"principalPointOffsetX", "principalPointOffsetY"})
-    if (sensor.number(name, 0.0) != 0.0) sensor.fail(name, "shifted lenses are not supported");
+/// Shifts the window of the film, in units of the whole film: a film point shows what is at the
+/// point plus the offset without.
+void shift(Camera& camera, Properties& sensor) {
+  camera.center.x() = 2.0 * camera.half_width * sensor.number("principalPointOffsetX", 0.0);
+  camera.center.y() = -2.0 * camera.half_height * sensor.number("principalPointOffsetY", 0.0);
 }
 
 /// How many samples a pixel gets is up to the command line; says which number the scene asks for.
@@ -207,35 +214,61 @@ void note_sampler(const Element& element, LoadContext& context) {
                                       spelling("sampleCount", element.dialect()), count));
 }
 
-PerspectiveCamera read_perspective(Properties& sensor, LoadContext& context) {
-  const FilmSize film = read_film_of(sensor, context);
-  const double aspect = static_cast<double>(film.width) / film.height;
-  PerspectiveCamera camera;
-  place(camera, sensor);
-  camera.filter = film.filter;
-  camera.half_width = read_half_width(sensor, aspect);
-  camera.half_height = camera.half_width / aspect;
-  crop(camera, film);
+void read_clips(Camera& camera, Properties& sensor) {
   camera.near_clip = sensor.positive("nearClip", 1e-2);
   camera.far_clip = sensor.positive("farClip", 1e4);
   if (!(camera.near_clip < camera.far_clip))
     sensor.fail("nearClip", "must be smaller than 'farClip'");
-  reject_shift(sensor);
-  // A pinhole has no focus, and nothing here moves.
-  sensor.ignore({"focusDistance", "shutterOpen", "shutterClose"});
-  for (const Element& sampler : sensor.nested({"sampler"})) note_sampler(sampler, context);
+}
+
+Camera read_perspective(Properties& sensor, const FilmSize& film) {
+  const double aspect = static_cast<double>(film.width) / film.height;
+  Camera camera;
+  const Vec3d lengths = place(camera, sensor);
+  if (!lengths.isOnes(1e-3))
+    sensor.fail("toWorld", "the transform of a perspective sensor must not scale");
+  camera.half_width = read_half_width(sensor, aspect);
+  camera.half_height = camera.half_width / aspect;
+  shift(camera, sensor);
+  read_clips(camera, sensor);
   return camera;
 }
 
-using SensorReader = PerspectiveCamera (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, SensorReader>, 1> kSensors{
-    {{"perspective", &read_perspective}}};
+/// The film is [-1, 1] wide in the sensor's own frame, and as high as its aspect wants.
+Camera read_orthographic(Properties& sensor, const FilmSize& film) {
+  Camera camera;
+  camera.projection = Camera::Projection::Orthographic;
+  const Vec3d lengths = place(camera, sensor);
+  // The image plane at distance 1 is as wide as that of a pinhole with some 50 degrees.
+  camera.half_width = 0.5;
+  camera.scale = 2.0 * lengths.x();
+  camera.half_height = lengths.y() * film.height / film.width / camera.scale;
+  read_clips(camera, sensor);
+  // In Mitsuba 3 rays start on the near plane, which a scale moves.
+  if (sensor.dialect() == Dialect::Mitsuba3) {
+    const double moved = camera.near_clip * (lengths.z() - 1.0);
+    camera.near_clip += moved;
+    camera.far_clip += moved;
+  }
+  return camera;
+}
+
+using SensorReader = Camera (*)(Properties&, const FilmSize&);
+constexpr std::array<std::pair<std::string_view, SensorReader>, 2> kSensors{
+    {{"perspective", &read_perspective}, {"orthographic", &read_orthographic}}};
 
 }  // namespace
 
-PerspectiveCamera read_sensor(const Element& element, LoadContext& context) {
+Camera read_sensor(const Element& element, LoadContext& context) {
   Properties properties(element);
-  const PerspectiveCamera camera = find_plugin(kSensors, properties)(properties, context);
+  const SensorReader read = find_plugin(kSensors, properties);
+  const FilmSize film = read_film_of(properties, context);
+  Camera camera = read(properties, film);
+  camera.filter = film.filter;
+  crop(camera, film);
+  // These have no focus, and nothing here moves.
+  properties.ignore({"focusDistance", "shutterOpen", "shutterClose"});
+  for (const Element& sampler : properties.nested({"sampler"})) note_sampler(sampler, context);
   properties.finish();
   context.objects.define(element, NamedObjects::Other{});
   return camera;

@@ -7,6 +7,6 @@
 namespace driftlight {
 
 /// <sensor type="perspective">, with its film.
-PerspectiveCamera read_sensor(const Element& element, LoadContext& context);
+Camera read_sensor(const Element& element, LoadContext& context);
 
 }  // namespace driftlight

@@ -66,8 +66,8 @@ TriangleMesh box(const Vec3d& low, const Vec3d& high) {
   return mesh;
 }
 
-PerspectiveCamera look_at(const Vec3d& origin, const Vec3d& target, double half_width) {
-  PerspectiveCamera camera;
+Camera look_at(const Vec3d& origin, const Vec3d& target, double half_width) {
+  Camera camera;
   camera.origin = origin;
   camera.forward = (target - origin).normalized();
   camera.right = camera.forward.cross(Vec3d::UnitY()).normalized();
@@ -320,7 +320,51 @@ Scene coated(bool with_point) {
   make->add_shape(quad({-0.9, 2.8, -0.6}, {1.8, 0, 0}, {0, 0, 1.4}), black, Rgbd{4, 4, 4});
   make->add_shape(round_mesh({-1.4, 1.9, -0.5}, 0.35, 4, false), black, Rgbd{6, 7, 8});
   if (with_point) make->add_emitter(PointEmitter{{1.3, 2.4, 1.2}, {3, 3, 2.5}});
-  PerspectiveCamera camera = look_at({0, 1.4, 3.6}, {0, 0.9, 0}, 0.5);
+  Camera camera = look_at({0, 1.4, 3.6}, {0, 0.9, 0}, 0.5);
+  camera.half_height = 0.375;
+  camera.film_width = 32;
+  camera.film_height = 24;
+  make->set_camera(camera);
+  return make->build();
+}
+
+Scene plan(bool with_glass) {
+  Workshop make;
+  const auto plain = make.one_sided(Diffuse{gray(0.7)});
+  add_walls(make, make.one_sided(Phong{textured(8, 0.2, 0.6), gray(0.3), 15}), plain, plain);
+  make->add_shape(sphere_at({-0.8, 0.5, 0.2}, 0.5),
+                  make.one_sided(RoughConductor{ggx(0.25), kGoldEta, kGoldK, gray(1.0)}));
+  make->add_shape(round_mesh({0.5, 0.5, -0.3}, 0.5, 8), plain);
+  const Texture weight = textured(8, 0.1, 0.9);
+  make->add_shape(
+      sphere_at({-1.3, 0.35, 1.1}, 0.35),
+      make.one_sided(Blend{weight, boxed(Diffuse{textured(8, 0.3, 0.8)}),
+                           boxed(RoughConductor{ggx(0.15), kGoldEta, kGoldK, gray(1.0)})}));
+  make->add_shape(
+      quad({0.9, 0.1, -1.2}, {0.9, 0, 0.4}, {0, 1.4, 0}, true, 0.1),
+      make.two_sided(Blend{weight, boxed(Plastic(kGlass, gray(0.5), gray(1.0), false)),
+                           boxed(Blend{gray(0.3), boxed(Phong{gray(0.3), gray(0.4), 20}),
+                                       boxed(Conductor{kGoldEta, kGoldK, gray(1.0)})})},
+                     Blend{weight, boxed(Diffuse{gray(0.7)}), boxed(Mask{gray(0.4), nullptr})}));
+  if (with_glass) {
+    make->add_shape(
+        round_mesh({0.6, 0.3, 1.2}, 0.3, 6),
+        make.one_sided(Blend{weight, boxed(RoughDielectric{ggx(0.2), kGlass, gray(1.0), gray(1.0)}),
+                             boxed(Blend{gray(0.5), boxed(Dielectric{kGlass, gray(1.0), gray(1.0)}),
+                                         boxed(Diffuse{gray(0.6)})})}));
+    make->add_shape(sphere_at({-0.1, 0.3, 0.9}, 0.3),
+                    make.one_sided(Dielectric{kGlass, gray(1.0), gray(1.0)}));
+    make->add_shape(sphere_at({1.2, 0.4, 0.6}, 0.4),
+                    make.one_sided(RoughDielectric{beckmann(0.25), kGlass, gray(1.0), gray(1.0)}));
+  }
+  const auto black = make.one_sided(Diffuse{gray(0.0)});
+  make->add_shape(quad({-0.6, 2.9, -0.6}, {1.2, 0, 0}, {0, 0, 1.2}), black, Rgbd{4, 4, 4});
+  make->add_shape(round_mesh({-1.5, 1.6, -1.0}, 0.3, 4, false), black, Rgbd{3, 4, 5});
+  make->add_emitter(SpotEmitter({0.3, 3.2, 2.0}, {-0.1, -3.0, -1.8}, {40, 35, 30}, 0.6, 0.2));
+  make->add_emitter(DirectionalEmitter{Vec3d(0.5, -1.0, -0.8).normalized(), {0.4, 0.5, 0.6}});
+  Camera camera = look_at({0.8, 2.6, 3.6}, {0, 0.7, 0}, 0.5);
+  camera.projection = Camera::Projection::Orthographic;
+  camera.scale = 3.6;
   camera.half_height = 0.375;
   camera.film_width = 32;
   camera.film_height = 24;
@@ -337,6 +381,7 @@ const std::vector<TestScene>& test_scenes() {
     result.push_back({"overcast", overcast(), 6});
     result.push_back({"stage", stage(), 6});
     result.push_back({"coated", coated(true), 6});
+    result.push_back({"plan", plan(true), 6});
     return result;
   }();
   return scenes;

@@ -24,11 +24,14 @@ struct TestScene {
 ///   overcast   the same kinds under a constant environment, seen through a rough window
 ///   stage      diffuse and glossy things under a spot and parallel light, behind smooth glass
 ///   coated     smooth and rough plastic, panes, masks and what only lets pass
+///   plan       diffuse, glossy and smooth things and blends of them under area emitters, a spot
+///              and parallel light, as an orthographic camera sees them
 const std::vector<TestScene>& test_scenes();
 
-/// The last of them, with a film of 32 x 24 pixels; path tracing finds all its light without the
-/// point emitter.
+/// With films of 32 x 24 pixels; path tracing finds all light of the first without the point
+/// emitter, and of the second without glass.
 Scene coated(bool with_point);
+Scene plan(bool with_glass);
 
 /// Paths that carry light, drawn from a scene by its PathSampler.
 std::vector<PathSampler::Sample> light_paths(const TestScene& scene, int count, std::uint64_t seed);
@@ -46,7 +49,7 @@ TriangleMesh round_mesh(const Vec3d& center, double radius, int rings, bool norm
 TriangleMesh box(const Vec3d& low, const Vec3d& high);
 
 /// A camera at `origin` that looks at `target`, y up, with this tangent of half its field of view.
-PerspectiveCamera look_at(const Vec3d& origin, const Vec3d& target, double half_width);
+Camera look_at(const Vec3d& origin, const Vec3d& target, double half_width);
 
 /// A smooth coloured pattern in [low, high].
 std::shared_ptr<const Bitmap> pattern_bitmap(int width, int height, double low, double high);

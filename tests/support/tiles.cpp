@@ -53,7 +53,7 @@ Scene limelight() {
   builder.add_shape(round_mesh({0.6, 0.5, 0.0}, 0.45, 5), white);
   builder.add_emitter(SpotEmitter({1.5, 2.5, 1.0}, {-1.6, -2.1, -0.9}, {20, 18, 15}, 0.6, 0.1));
   builder.add_emitter(DirectionalEmitter{Vec3d(0.6, -1.0, -0.7).normalized(), {0.5, 0.8, 1.0}});
-  PerspectiveCamera camera = look_at({0.2, 1.6, 3.0}, {0, 0.6, 0}, 0.5);
+  Camera camera = look_at({0.2, 1.6, 3.0}, {0, 0.6, 0}, 0.5);
   camera.half_height = 0.375;
   camera.film_width = 32;
   camera.film_height = 24;
