@@ -83,6 +83,11 @@ int lobe_count(const Bsdf& bsdf) {
   if (const auto* mask = std::get_if<Mask>(&bsdf))
     return mask->nested == nullptr ? 0 : lobe_count(mask->nested->bsdf);
   if (is_delta(bsdf)) return 0;
+  // Black, which fills up blends, has no share in anything.
+  const auto* diffuse = std::get_if<Diffuse>(&bsdf);
+  if (diffuse != nullptr && diffuse->reflectance.is_constant() &&
+      (diffuse->reflectance.color == 0.0).all())
+    return 0;
   return std::holds_alternative<Phong>(bsdf) || std::holds_alternative<RoughPlastic>(bsdf) ? 2 : 1;
 }
 

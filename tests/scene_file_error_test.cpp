@@ -70,7 +70,9 @@ const Fault kFileFaults[] = {
      R"(
   @<bsdf type="velvet"/>)",
      {"bsdf 'velvet'", "roughconductor"}},
-    {"UnknownEmitter", R"(@<emitter type="sunsky"/>)", {"emitter 'sunsky'", "envmap", "spot"}},
+    {"UnknownEmitter",
+     R"(@<emitter type="collimated"/>)",
+     {"emitter 'collimated'", "envmap", "spot"}},
     {"UnknownTexture", R"(@<texture type="wood"/>)", {"texture 'wood'", "bitmap"}},
     {"UnknownProperty",
      R"(<bsdf type="diffuse">@<float name="shine" value="1"/></bsdf>)",

@@ -176,6 +176,15 @@ std::shared_ptr<const BsdfBox> boxed(const Bsdf& bsdf) {
   return std::make_shared<const BsdfBox>(BsdfBox{bsdf});
 }
 
+/// A texture that may also be given as one number.
+Texture read_scalar(Properties& properties, std::string_view name, double fallback,
+                    LoadContext& context) {
+  const std::optional<Element> child = properties.find(name);
+  if (child && child->tag() == "float")
+    return Texture(Rgbd::Constant(properties.non_negative(name, fallback)));
+  return read_textured(properties, name, Rgbd::Constant(fallback), context);
+}
+
 /// Each side masks its own BSDF. Black back sides let pass too.
 Surface read_mask(Properties& properties, LoadContext& context) {
   const std::vector<Element> nested = properties.nested({"bsdf", "ref"});
@@ -183,7 +192,7 @@ Surface read_mask(Properties& properties, LoadContext& context) {
   const std::shared_ptr<Surface> surface = read_surface(nested.front(), context);
   if (delta_eta(surface->front) != 1.0)
     nested.front().fail("a smooth dielectric cannot be nested in a mask: a thindielectric can");
-  const Texture opacity = read_textured(properties, "opacity", Rgbd::Constant(0.5), context);
+  const Texture opacity = read_scalar(properties, "opacity", 0.5, context);
   if (opacity.maximum() > 1.0) properties.fail("opacity", "must be between 0 and 1");
   const auto masked = [&](const Bsdf& bsdf) { return Mask{opacity, boxed(bsdf)}; };
   Surface result{masked(surface->front), std::nullopt, std::nullopt};
@@ -221,7 +230,7 @@ Surface blend(const Element& element, const Texture& weight, const Surface& firs
 /// One number from the colours of a texture: their mean in Mitsuba 0.6, their luminance in 3.
 Texture read_weight(Properties& properties, LoadContext& context) {
   if (!properties.has("weight")) properties.element().fail("a blendbsdf needs a 'weight'");
-  Texture texture = read_textured(properties, "weight", Rgbd::Zero(), context);
+  Texture texture = read_scalar(properties, "weight", 0.0, context);
   if (texture.maximum() > 1.0) properties.fail("weight", "must be between 0 and 1");
   const bool newer = properties.dialect() == Dialect::Mitsuba3;
   const Rgbd factors = newer ? kLuminance : Rgbd::Constant(1.0 / 3.0);
