@@ -162,6 +162,15 @@ void run(const IntegratorsCommand& /*command*/) {
           "lmc",
           "mmlt with Langevin steps and a diagonal preconditioner that adapts to gradients (Luan, "
           "Zhao, Bala and Gkioulekas 2020, doi 10.1145/3386569.3392382)") +
+      describe_integrator<MltOptions>(
+          "mlt",
+          "Metropolis light transport by bidirectional mutations and lens, caustic and multi-chain "
+          "perturbations of paths (Veach and Guibas 1997, doi 10.1145/258734.258775)") +
+      describe_integrator<ErptOptions>(
+          "erpt",
+          "energy redistribution path tracing: bidirectional samples whose light short chains of "
+          "the perturbations of mlt spread (Cline, Talbot and Egbert 2005, "
+          "doi 10.1145/1073204.1073330)") +
       describe_integrator<PathOptions>(
           "path",
           "path tracing with next-event estimation (Kajiya 1986, doi 10.1145/15922.15902; "
