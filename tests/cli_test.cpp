@@ -141,6 +141,7 @@ const std::vector<Mistake> kRenderMistakes{
     {{"scene.xml", "--integrator", "pssmlt", "--set", "step_min=0.5"}, {"step_min", "step_max"}},
     {{"scene.xml", "--integrator", "mlt", "--set", "step_min=0.5"}, {"step_min", "step_max"}},
     {{"scene.xml", "--integrator", "erpt", "--set", "pilot=1"}, {"pilot", "'1'", "[256"}},
+    {{"scene.xml", "--set", "second_scale=0"}, {"second_scale", "'0'", "> 0"}},
     {{"scene.xml", "--time", "1", "--mutations-per-pixel", "4"}, {"only one", "--time"}},
     {{"scene.xml", "--integrator", "path", "--time", "1", "--spp", "4"}, {"only one", "--spp"}},
     {{"scene.xml", "-v", "-q"}, {"-v", "-q"}},

@@ -53,6 +53,7 @@ struct Way {
   RedistributionOptions redistribution = {};
   bool aperture = false;
   SplittingOptions splitting = {};
+  bool delayed_rejection = false;
 };
 
 const std::map<std::string, Way>& ways() {
@@ -63,6 +64,7 @@ const std::map<std::string, Way>& ways() {
       {"from_sensor", {.large_steps = LargeSteps::Path, .direct = DirectLight::Chain}},
       {"chains_alone", {.drift = Drift::None, .direct = DirectLight::Chain}},
       {"aperture", {.aperture = true}},
+      {"delayed", {.phase_space = PhaseSpace::Bidirectional, .delayed_rejection = true}},
       {"both_ends", {.phase_space = PhaseSpace::Bidirectional}},
       {"redistribution", {.mode = Mode::Redistribution}},
       {"short_chains",
@@ -142,6 +144,7 @@ TEST_P(LangevinEqualsPath, TileMeans) {
   options.phase_space = way.phase_space;
   options.redistribution = way.redistribution;
   options.splitting = way.splitting;
+  options.delayed_rejection = way.delayed_rejection;
   options.splitting.pilot = 8192;
   options.bootstrap = work.bootstrap;
   options.max_depth = loaded.max_depth.value();
@@ -162,6 +165,7 @@ std::string name_of(const testing::TestParamInfo<Case>& info) {
 INSTANTIATE_TEST_SUITE_P(
     Some, LangevinEqualsPath,
     testing::Values(Case{"furnace_sphere", "redistribution"}, Case{"cornell_glossy", "both_ends"},
+                    Case{"cornell_glossy", "delayed"}, Case{"ring_caustic", "delayed"},
                     Case{"cornell_glossy", "redistribution"}, Case{"glass_caustic", "gradient"},
                     Case{"glass_caustic", "short_chains"}, Case{"small_hole", "redistribution"},
                     Case{"glossy_chain", "redistribution"},

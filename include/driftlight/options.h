@@ -111,6 +111,11 @@ struct LangevinOptions {
   std::optional<double> large_step_probability;
   LargeSteps large_steps = LargeSteps::Bdpt;
   DirectLight direct = DirectLight::Apart;
+  /// Of Mode::Chain: a rejected small step is followed by a second one, `second_scale` times its
+  /// scale (Rioux-Lavoie et al. 2020, "Delayed rejection Metropolis light transport"; Tierney and
+  /// Mira 1999; Green and Mira 2001).
+  bool delayed_rejection = false;
+  double second_scale = 0.2;
   /// Independent chains, whatever the number of threads.
   int chains = 128;
   /// Samples that estimate the normalization b and start the chains.

@@ -102,6 +102,7 @@ struct LevelFigures {
 struct LangevinStatistics {
   KernelStatistics large_step;
   KernelStatistics small_step;
+  KernelStatistics second_step;       ///< those that follow a rejected small one
   double large_step_probability = 0;  ///< that was used
   Rejections rejections;
   /// Mutations spent at paths of n edges.

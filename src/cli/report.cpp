@@ -194,7 +194,11 @@ Report metropolis_report(const std::string& integrator, const LangevinResult& re
          {"hastings", s.rejections.hastings}}},
        {"seconds", {{"bootstrap", s.bootstrap_seconds}, {"render", s.render_seconds}}}});
   report.details = {describe("large steps", s.large_step), describe("small steps", s.small_step),
-                    describe(s.rejections, s.small_step.proposed)};
+                    describe(s.rejections, s.small_step.proposed + s.second_step.proposed)};
+  if (s.second_step.proposed > 0) {
+    report.statistics["kernels"]["second_step"] = to_json(s.second_step);
+    report.details.push_back(describe("second steps", s.second_step));
+  }
   return report;
 }
 
