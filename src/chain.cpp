@@ -14,6 +14,7 @@ Chain::Chain(const Scene& scene, const PathSampler& sampler, const LangevinOptio
       film_(film),
       rng_(rng),
       layers_(layers) {
+  if (options.delayed_rejection) second_scale_ = options.second_scale;
   current().topology = start.topology;
   current().coordinates = start.coordinates;
   current().contribution = contribution(scene, start.topology, start.coordinates);
@@ -22,13 +23,17 @@ Chain::Chain(const Scene& scene, const PathSampler& sampler, const LangevinOptio
 void Chain::run(std::uint64_t mutations) {
   for (std::uint64_t i = 0; i < mutations; ++i) {
     const bool large = rng_.uniform() < large_step_probability_;
+    if (!large && second_scale_) {
+      take_delayed_step();
+      continue;
+    }
     KernelStatistics& kernel = large ? statistics_.large_step : statistics_.small_step;
     const std::optional<double> acceptance = large ? propose_large() : propose_small();
     ++kernel.proposed;
     kernel.accepted += acceptance.value_or(0.0);
     if (layers_ != nullptr && !large)
       small_step_.record(current(), acceptance.value_or(0.0), *layers_);
-    const bool moved = resolve(acceptance.value_or(0.0));
+    const bool moved = resolve(acceptance.value_or(0.0), proposed_);
     if (acceptance && !moved && !large) ++statistics_.rejections.hastings;
   }
   statistics_.mutations += mutations;
@@ -73,16 +78,71 @@ std::optional<double> Chain::propose_small() {
                                  densities->forward, densities->reverse));
 }
 
-bool Chain::resolve(double acceptance) {
+/// The states get weights whose mean is that of what the chain visits: the first proposal 1 if it
+/// is accepted, else the second one a2 and the current state 1 - a2.
+void Chain::take_delayed_step() {
+  KernelStatistics& first = statistics_.small_step;
+  const bool valid = small_step_.propose(current(), proposed(), rng_, statistics_.rejections);
+  double acceptance = 0.0;
+  if (valid) {
+    const auto densities = small_step_.log_densities(current(), proposed(), statistics_.rejections);
+    if (densities)
+      acceptance = std::exp(log_acceptance(current().contribution.log_target,
+                                           proposed().contribution.log_target, densities->forward,
+                                           densities->reverse));
+  }
+  ++first.proposed;
+  first.accepted += acceptance;
+  if (rng_.uniform() < acceptance) {
+    if (layers_ != nullptr) small_step_.record(current(), 1.0, *layers_);
+    resolve(1.0, proposed_);
+    return;
+  }
+  if (acceptance > 0.0) ++statistics_.rejections.hastings;
+  const double second = current().finite ? propose_second(acceptance, valid) : 0.0;
+  if (layers_ != nullptr) small_step_.record(current(), second, *layers_);
+  const bool moved = resolve(second, second_);
+  if (second > 0.0 && !moved) ++statistics_.rejections.hastings;
+}
+
+double Chain::propose_second(double first_acceptance, bool valid) {
+  ChainState& from = current();
+  ChainState& ghost = proposed();
+  ChainState& to = states_[second_];
+  Rejections& rejections = statistics_.rejections;
+  ++statistics_.second_step.proposed;
+  if (!small_step_.propose_again(from, to, *second_scale_, rng_, rejections)) return 0.0;
+  const auto densities = small_step_.log_densities(from, to, rejections);
+  if (!densities) return 0.0;
+  const double log_target = to.contribution.log_target;
+  const double to_ghost = small_step_.log_first_density(to, ghost.coordinates);
+  // A ghost that is no path, or has no step, would be refused from everywhere.
+  double log_first = -std::numeric_limits<double>::infinity();
+  if (valid && ghost.finite)
+    log_first = log_acceptance(log_target, ghost.contribution.log_target, to_ghost,
+                               small_step_.log_first_density(ghost, to.coordinates));
+  const double here = log_refused(small_step_.log_first_density(from, ghost.coordinates),
+                                  std::log(first_acceptance));
+  const double acceptance = std::exp(log_acceptance(from.contribution.log_target + here,
+                                                    log_target + log_refused(to_ghost, log_first),
+                                                    densities->forward, densities->reverse));
+  statistics_.second_step.accepted += acceptance;
+  return acceptance;
+}
+
+bool Chain::resolve(double acceptance, std::size_t index) {
   ++statistics_.path_length[static_cast<std::size_t>(current().topology.length())];
   gathered_ += 1.0 - acceptance;
   const bool accept = rng_.uniform() < acceptance;
   if (accept) {
     flush();
-    current_ = 1 - current_;
+    // What is left is free for the next proposals.
+    std::size_t& free = index == proposed_ ? proposed_ : second_;
+    free = current_;
+    current_ = index;
     gathered_ = acceptance;
   } else if (acceptance > 0.0) {
-    const ChainState& to = proposed();
+    const ChainState& to = states_[index];
     film_.splat(to.contribution.film, to.contribution.color, acceptance);
   }
   return accept;

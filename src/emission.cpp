@@ -53,6 +53,14 @@ Emission emit(const Scene& scene, std::uint32_t index, const EmissionSample& u) 
   return end.at_infinity() ? emit_from_infinity(scene, end, u) : emit_from_point(scene, end, u);
 }
 
+Emission emit_from(const Scene& scene, const LightEnd& end, const Vec2d& u) {
+  const EmissionSample sample{0.0, 0.0, u.x(), u.y()};
+  if (end.at_infinity()) return emit_from_infinity(scene, end, sample);
+  if (end.kind == LightEnd::Kind::Point) return emit_from_point(scene, end, sample);
+  const Vec3d local = square_to_cosine_hemisphere(u.x(), u.y());
+  return leave_area(scene, end, to_world(local, end.n), local.z());
+}
+
 EmissionSample emission_sample(const Scene& scene, std::uint32_t index, const Vec3d& p,
                                const Vec3d& v) {
   const Emitter& emitter = scene.emitters()[index];

@@ -38,6 +38,11 @@ struct Emission {
 /// The ray that a sample makes of the emitter of this index.
 Emission emit(const Scene& scene, std::uint32_t index, const EmissionSample& u);
 
+/// A ray that leaves this end, from two numbers in [0, 1): into a direction by the cosine, of a
+/// point or spot by its intensity; from infinity through a uniform point of the disk. Uniform
+/// numbers make rays of the density emission_density.
+Emission emit_from(const Scene& scene, const LightEnd& end, const Vec2d& u);
+
 /// The sample of a ray along the unit direction v through p, a point on a finite emitter or any
 /// point of the ray of one at infinity; 0 on axes without an inverse.
 EmissionSample emission_sample(const Scene& scene, std::uint32_t index, const Vec3d& p,

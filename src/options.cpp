@@ -152,6 +152,11 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
                      "probability of an independent proposal; auto: from the bootstrap"),
       choice("large_steps", options.large_steps, std::array<std::string_view, 2>{"path", "bdpt"},
              "where independent proposals come from: the sensor, or both ends"),
+      choice("delayed_rejection", options.delayed_rejection,
+             std::array<std::string_view, 2>{"off", "on"},
+             "chain: a rejected small step is followed by a second, smaller one"),
+      number("second_scale", options.second_scale, positive,
+             "chain: scale of that second step, over that of the first"),
       direct(options.direct),
       number("threshold", redistribution.threshold, positive,
              "redistribution: samples keep so many times the local brightness"),
@@ -248,6 +253,48 @@ std::vector<OptionEntry> entries(LmcOptions& options) {
               "the t-th gradient weighs t^-adaptation_decay among former ones")});
 }
 
+namespace {
+
+/// Those of the perturbations, behind the `first` and before the `last`.
+std::vector<OptionEntry> perturbation_entries(PerturbationOptions& options,
+                                              std::vector<OptionEntry> first,
+                                              const std::vector<OptionEntry>& last) {
+  const Range<double> size{.low = 0, .high = 1, .open = true};
+  first.push_back(number("step_min", options.step_min, size,
+                         "least step of a perturbation, in widths of the film, at most step_max"));
+  first.push_back(number("step_max", options.step_max, size, "largest step of a perturbation"));
+  first.push_back(direct(options.direct));
+  first.insert(first.end(), last.begin(), last.end());
+  first.push_back(max_depth(options.max_depth));
+  return first;
+}
+
+void check_steps(double step_min, double step_max) {
+  if (step_min > step_max)
+    throw OptionError(
+        fmt::format("option step_min = '{}': must be at most step_max = {}", step_min, step_max));
+}
+
+}  // namespace
+
+std::vector<OptionEntry> entries(MltOptions& options) {
+  return perturbation_entries(
+      options,
+      {number("bidirectional_probability", options.bidirectional_probability, Range<double>{0, 1},
+              "probability of a bidirectional mutation; the others are perturbations")},
+      {chains(options.chains), bootstrap(options.bootstrap)});
+}
+
+std::vector<OptionEntry> entries(ErptOptions& options) {
+  return perturbation_entries(
+      options,
+      {number("chain_length", options.chain_length, Range<int>{1, 1000000}, "mutations of a chain"),
+       number("mutations_per_sample", options.mutations_per_sample,
+              Range<double>{.low = 0, .open = true}, "mutations for each sample, in the mean")},
+      {number("pilot", options.pilot, Range<int>{256, 1000000000},
+              "samples that find how much light each mutation deposits")});
+}
+
 std::string_view name_of(PhaseSpace phase_space) {
   return kPhaseSpaces.at(static_cast<std::size_t>(phase_space));
 }
@@ -275,9 +322,7 @@ void LightOptions::validate() const {
 void PrimaryOptions::validate() const {
   PrimaryOptions copy = *this;
   check(entries(copy));
-  if (step_min > step_max)
-    throw OptionError(
-        fmt::format("option step_min = '{}': must be at most step_max = {}", step_min, step_max));
+  check_steps(step_min, step_max);
 }
 
 void H2mcOptions::validate() const {
@@ -290,6 +335,18 @@ void LmcOptions::validate() const {
   PrimaryOptions::validate();
   LmcOptions copy = *this;
   check(entries(copy));
+}
+
+void MltOptions::validate() const {
+  MltOptions copy = *this;
+  check(entries(copy));
+  check_steps(step_min, step_max);
+}
+
+void ErptOptions::validate() const {
+  ErptOptions copy = *this;
+  check(entries(copy));
+  check_steps(step_min, step_max);
 }
 
 void set_option(const std::vector<OptionEntry>& entries, const std::string& name,

@@ -45,6 +45,7 @@ LevelFigures& LevelFigures::operator+=(const LevelFigures& other) {
 LangevinStatistics& LangevinStatistics::operator+=(const LangevinStatistics& other) {
   large_step += other.large_step;
   small_step += other.small_step;
+  second_step += other.second_step;
   rejections += other.rejections;
   for (std::size_t n = 0; n < path_length.size(); ++n) path_length[n] += other.path_length[n];
   mutations += other.mutations;

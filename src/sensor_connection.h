@@ -8,6 +8,9 @@
 
 namespace driftlight {
 
+/// Whether the sensor sees the surface point, through its film and past the near plane.
+bool sensor_sees(const Scene& scene, const SurfaceHit& x);
+
 struct SensorConnection {
   Vec2d film{0, 0};     ///< in [0, 1)^2
   Vec3d wi{0, 0, 0};    ///< from the vertex to the sensor

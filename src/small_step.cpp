@@ -46,6 +46,10 @@ double log_acceptance(double log_target_from, double log_target_to, double log_p
                                : std::min(0.0, log_ratio);
 }
 
+double log_refused(double log_pdf, double log_first_acceptance) {
+  return log_pdf + std::log(-std::expm1(log_first_acceptance));
+}
+
 void prepare_step(const Scene& scene, const KernelOptions& options, ChainState& state) {
   const DerivativeRequest request{
       .gradient = options.drift != Drift::None,
@@ -79,7 +83,17 @@ bool SmallStep::propose(ChainState& from, ChainState& to, Rng& rng, Rejections& 
     ++rejections.non_finite;
     return false;
   }
-  scale_ = draw_scale(options_, rng);
+  scale_ = first_scale_ = draw_scale(options_, rng);
+  return step(from, to, rng, rejections);
+}
+
+bool SmallStep::propose_again(ChainState& from, ChainState& to, double factor, Rng& rng,
+                              Rejections& rejections) {
+  scale_ = factor * first_scale_;
+  return step(from, to, rng, rejections);
+}
+
+bool SmallStep::step(ChainState& from, ChainState& to, Rng& rng, Rejections& rejections) {
   const Vector delta = from.step.sample(scale_, rng);
   if (!delta.allFinite()) {
     ++rejections.non_finite;
@@ -108,6 +122,12 @@ std::optional<LogDensities> SmallStep::log_densities(ChainState& from, ChainStat
     return std::nullopt;
   }
   return LogDensities{forward, reverse};
+}
+
+double SmallStep::log_first_density(const ChainState& from, const PathCoordinates& to) const {
+  const auto there = from.chart.inverse(to);
+  if (!there) return -std::numeric_limits<double>::infinity();
+  return from.step.log_density(there->delta, first_scale_) + there->log_jacobian;
 }
 
 void SmallStep::record(ChainState& from, double acceptance, StepLayers& layers) const {

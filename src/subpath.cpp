@@ -12,40 +12,34 @@ constexpr int kRouletteDepth = 4;
 
 Rgbd color_of(const ScaledColor<double>& f) { return std::exp(f.log_scale) * f.color; }
 
-/// A scattering event: its factor of the path contribution and its densities by both walks.
-struct Event {
-  Rgbd f;
-  double toward_light;
-  double toward_sensor;
-};
-
-Event event(const SurfaceHit& x, const Vec3d& wi, const Vec3d& wo) {
-  return {scattered(x, wi, wo), pdf(*x.bsdf, x.surface(), wi, wo),
-          pdf(*x.bsdf, x.surface(), wo, wi)};
-}
-
 /// (n_o / n_i)^2 of a delta transmission.
 double squared_index_ratio(const Bsdf& bsdf, double cos_i) {
   const double eta = delta_eta(bsdf);
   return cos_i > 0.0 ? eta * eta : 1.0 / (eta * eta);
 }
 
-/// P and P J; Fresnel's equations give P the same value on both sides.
-Event delta_event(const SurfaceHit& x, const Vec3d& wi, const Vec3d& wo, Scattering scattering) {
+}  // namespace
+
+Rgbd scattered(const SurfaceHit& x, const Vec3d& wi, const Vec3d& wo) {
+  return color_of(eval(*x.bsdf, x.surface(), wi, wo));
+}
+
+ScatteringDensities density_event(const SurfaceHit& x, const Vec3d& wi, const Vec3d& wo) {
+  return {scattered(x, wi, wo), pdf(*x.bsdf, x.surface(), wi, wo),
+          pdf(*x.bsdf, x.surface(), wo, wi)};
+}
+
+/// Fresnel's equations give P the same value on both sides.
+ScatteringDensities delta_event(const SurfaceHit& x, const Vec3d& wi, const Vec3d& wo,
+                                Scattering scattering) {
   const SurfacePoint<double> at = x.surface();
-  const double p = delta_probability(*x.bsdf, at, x.wi, scattering);
+  const double p = delta_probability(*x.bsdf, at, wi, scattering);
   double j = 1.0;
   if (scattering == Scattering::Transmission) {
     const double cos_i = at.n.dot(wi);
     j = std::abs(cos_i / at.n.dot(wo)) / squared_index_ratio(*x.bsdf, cos_i);
   }
   return {color_of(eval_delta(*x.bsdf, at, wi, scattering)), p, p * j};
-}
-
-}  // namespace
-
-Rgbd scattered(const SurfaceHit& x, const Vec3d& wi, const Vec3d& wo) {
-  return color_of(eval(*x.bsdf, x.surface(), wi, wo));
 }
 
 /// v is uniform over the film: its density is the importance W(v), by area across parallel rays
@@ -112,7 +106,8 @@ Departure SubpathTracer::depart(Walk walk, const SubpathVertex& x, const BsdfSam
   const bool from_sensor = walk == Walk::FromSensor;
   const Vec3d& wi = from_sensor ? at.wi : next.wo;
   const Vec3d& wo = from_sensor ? next.wo : at.wi;
-  const Event e = next.delta ? delta_event(at, wi, wo, next.scattering) : event(at, wi, wo);
+  const ScatteringDensities e =
+      next.delta ? delta_event(at, wi, wo, next.scattering) : density_event(at, wi, wo);
   const double forward = from_sensor ? e.toward_light : e.toward_sensor;
   const double backward = from_sensor ? e.toward_sensor : e.toward_light;
   Departure from;

@@ -131,4 +131,16 @@ class SubpathTracer {
 /// f_s |n_s . wo| with wi toward the sensor and wo toward the light, as a colour; of densities.
 Rgbd scattered(const SurfaceHit& x, const Vec3d& wi, const Vec3d& wo);
 
+/// A scattering event: its factor of the path contribution, and its densities per solid angle by
+/// both walks; by a delta lobe what remains of these, P toward the light and P J toward the sensor.
+struct ScatteringDensities {
+  Rgbd f;
+  double toward_light;
+  double toward_sensor;
+};
+/// By the BSDF's density, and by its delta lobe of this kind.
+ScatteringDensities density_event(const SurfaceHit& x, const Vec3d& wi, const Vec3d& wo);
+ScatteringDensities delta_event(const SurfaceHit& x, const Vec3d& wi, const Vec3d& wo,
+                                Scattering scattering);
+
 }  // namespace driftlight

@@ -148,6 +148,7 @@ class SegmentVisitor : public WalkVisitor<double> {
   const Vec3d& ray() const { return ray_; }
 
   void depart(const Ray<double>& ray, const Vec3d&) { leave(ray.origin, ray.direction); }
+  void depart_parallel(const Ray<double>& ray) { leave(ray.origin, ray.direction); }
   void connect(const ScatterEvent<double>& e) { leave(e.at.p, e.wo); }
 
  private:

@@ -236,8 +236,9 @@ TEST(Bidirectional, WeightsAreThoseOfDirections) {
       ++compared;
       ++ends[b->topology.end];
       const Contribution g = value_of(*test, *b);
-      EXPECT_NEAR(f.log_target - directions.log_density(a->topology, a->coordinates),
-                  g.log_target - bidirectional.log_density(b->topology, b->coordinates), 1e-9)
+      const double weight = f.log_target - directions.log_density(a->topology, a->coordinates);
+      EXPECT_NEAR(weight, g.log_target - bidirectional.log_density(b->topology, b->coordinates),
+                  1e-9 + 1e-10 * std::abs(weight))
           << test->name << ", " << path_class(test->scene, b->topology, b->coordinates);
       EXPECT_LT((f.color - g.color).abs().maxCoeff(), 1e-8);
       EXPECT_LT((f.film - g.film).norm(), 1e-8);

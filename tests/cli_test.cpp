@@ -106,7 +106,8 @@ const std::vector<Mistake> kRenderMistakes{
     {{"missing.xml"}, {"missing.xml"}},
     {{"broken.xml"}, {"broken.xml:"}},
     {{"scene.xml", "--integrator", "photons"},
-     {"'photons'", "langevin", "pssmlt", "mmlt", "h2mc", "lmc", "path", "bdpt", "light"}},
+     {"'photons'", "langevin", "pssmlt", "mmlt", "h2mc", "lmc", "mlt", "erpt", "path", "bdpt",
+      "light"}},
     {{"scene.xml", "--set", "speed=1"}, {"'speed'", "drift", "epsilon"}},
     {{"scene.xml", "--set", "drift=sideways"}, {"drift", "'sideways'", "none|gradient|full"}},
     {{"scene.xml", "--set", "epsilon=-1"}, {"epsilon", "'-1'", "> 0"}},
@@ -136,7 +137,12 @@ const std::vector<Mistake> kRenderMistakes{
     {{"scene.xml", "--integrator", "bdpt", "--mutations-per-pixel", "4"},
      {"--mutations-per-pixel", "bdpt", "--spp"}},
     {{"scene.xml", "--integrator", "mmlt", "--spp", "4"}, {"mmlt", "--mutations-per-pixel"}},
+    {{"scene.xml", "--integrator", "mlt", "--spp", "4"}, {"mlt", "--mutations-per-pixel"}},
+    {{"scene.xml", "--integrator", "erpt", "--mutations-per-pixel", "4"}, {"erpt", "--spp"}},
     {{"scene.xml", "--integrator", "pssmlt", "--set", "step_min=0.5"}, {"step_min", "step_max"}},
+    {{"scene.xml", "--integrator", "mlt", "--set", "step_min=0.5"}, {"step_min", "step_max"}},
+    {{"scene.xml", "--integrator", "erpt", "--set", "pilot=1"}, {"pilot", "'1'", "[256"}},
+    {{"scene.xml", "--set", "second_scale=0"}, {"second_scale", "'0'", "> 0"}},
     {{"scene.xml", "--time", "1", "--mutations-per-pixel", "4"}, {"only one", "--time"}},
     {{"scene.xml", "--integrator", "path", "--time", "1", "--spp", "4"}, {"only one", "--spp"}},
     {{"scene.xml", "-v", "-q"}, {"-v", "-q"}},
@@ -356,6 +362,8 @@ TEST_F(Cli, TheSameSeedGivesTheSameBytesOnAnyNumberOfThreads) {
       {"--integrator", "mmlt", "--mutations-per-pixel", "20"},
       {"--integrator", "h2mc", "--mutations-per-pixel", "2"},
       {"--integrator", "lmc", "--mutations-per-pixel", "2"},
+      {"--integrator", "mlt", "--mutations-per-pixel", "20"},
+      {"--integrator", "erpt", "--spp", "1"},
       {"--integrator", "path", "--spp", "4"},
       {"--integrator", "bdpt", "--spp", "4"},
       {"--integrator", "light", "--spp", "4"},
@@ -379,7 +387,7 @@ TEST_F(Cli, TheSameSeedGivesTheSameBytesOnAnyNumberOfThreads) {
 
 TEST_F(Cli, TimeEndsTheRender) {
   for (const char* integrator :
-       {"langevin", "pssmlt", "mmlt", "h2mc", "lmc", "path", "bdpt", "light"}) {
+       {"langevin", "pssmlt", "mmlt", "h2mc", "lmc", "mlt", "erpt", "path", "bdpt", "light"}) {
     const auto start = std::chrono::steady_clock::now();
     const Outcome outcome = run({"render", "scene.xml", "--integrator", integrator, "--time", "1",
                                  "-o", "a.exr", "--stats", "s.json"});

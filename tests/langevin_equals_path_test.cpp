@@ -54,6 +54,7 @@ struct Way {
   RedistributionOptions redistribution = {};
   bool aperture = false;
   SplittingOptions splitting = {};
+  bool delayed_rejection = false;
 };
 
 const std::map<std::string, Way>& ways() {
@@ -64,6 +65,7 @@ const std::map<std::string, Way>& ways() {
       {"from_sensor", {.large_steps = LargeSteps::Path, .direct = DirectLight::Chain}},
       {"chains_alone", {.drift = Drift::None, .direct = DirectLight::Chain}},
       {"aperture", {.aperture = true}},
+      {"delayed", {.phase_space = PhaseSpace::Bidirectional, .delayed_rejection = true}},
       {"both_ends", {.phase_space = PhaseSpace::Bidirectional}},
       {"redistribution", {.mode = Mode::Redistribution}},
       {"short_chains",
@@ -144,6 +146,7 @@ TEST_P(LangevinEqualsPath, TileMeans) {
   options.phase_space = way.phase_space;
   options.redistribution = way.redistribution;
   options.splitting = way.splitting;
+  options.delayed_rejection = way.delayed_rejection;
   options.splitting.pilot = 8192;
   options.bootstrap = work.bootstrap;
   options.max_depth = loaded.max_depth.value();
@@ -164,6 +167,7 @@ std::string name_of(const testing::TestParamInfo<Case>& info) {
 INSTANTIATE_TEST_SUITE_P(
     Some, LangevinEqualsPath,
     testing::Values(Case{"furnace_sphere", "redistribution"}, Case{"cornell_glossy", "both_ends"},
+                    Case{"cornell_glossy", "delayed"}, Case{"ring_caustic", "delayed"},
                     Case{"cornell_glossy", "redistribution"}, Case{"glass_caustic", "gradient"},
                     Case{"glass_caustic", "short_chains"}, Case{"small_hole", "redistribution"},
                     Case{"glossy_chain", "redistribution"},
@@ -239,6 +243,55 @@ std::vector<Case> all_primary_cases() {
 INSTANTIATE_TEST_SUITE_P(DISABLED_All, PrimaryEqualsPath, testing::ValuesIn(all_primary_cases()),
                          name_of);
 
+/// Chains of paths by their vertices.
+class MutationsEqualPath : public testing::TestWithParam<Case> {};
+
+Image render_by_mutations(const LoadedScene& loaded, const std::string& name, DirectLight direct,
+                          int bootstrap, double mutations_per_pixel, std::uint64_t seed) {
+  RenderOptions render;
+  render.seed = seed;
+  const auto with = [&](auto options) {
+    options.max_depth = loaded.max_depth.value();
+    options.direct = direct;
+    return options;
+  };
+  if (name == "erpt") {
+    ErptOptions options = with(ErptOptions{});
+    options.mutations_per_sample = 25;
+    options.chain_length = 50;
+    return render_erpt(loaded.scene, options, render, 40).image;
+  }
+  MltOptions options = with(MltOptions{});
+  options.bootstrap = bootstrap;
+  return render_mlt(loaded.scene, options, render, mutations_per_pixel).image;
+}
+
+TEST_P(MutationsEqualPath, TileMeans) {
+  const auto& [scene, name] = GetParam();
+  const Work& work = works().at(scene);
+  const LoadedScene loaded = load_scene_of(scene);
+  const DirectLight direct = scene == "limelight" ? DirectLight::Chain : DirectLight::Apart;
+  const auto tiles = tiles_over_runs([&](std::uint64_t seed) {
+    return render_by_mutations(loaded, name, direct, work.bootstrap, work.mutations_per_pixel,
+                               seed);
+  });
+  test::expect_equal_tiles(name, tiles, traced_tiles(scene), work.resolution);
+}
+
+INSTANTIATE_TEST_SUITE_P(Some, MutationsEqualPath,
+                         testing::Values(Case{"limelight", "mlt"}, Case{"limelight", "erpt"}),
+                         name_of);
+
+std::vector<Case> all_mutation_cases() {
+  std::vector<Case> cases;
+  for (const auto& scene : works())
+    for (const char* name : {"mlt", "erpt"}) cases.emplace_back(scene.first, name);
+  return cases;
+}
+
+INSTANTIATE_TEST_SUITE_P(DISABLED_All, MutationsEqualPath, testing::ValuesIn(all_mutation_cases()),
+                         name_of);
+
 /// A point behind glass and mirrors: path tracing finds nothing, and paths have coordinates from
 /// both ends only. Against bidirectional path tracing, without drift and with all of it.
 TEST(LangevinEqualsBdpt, PointCaustic) {
@@ -262,6 +315,22 @@ TEST(LangevinEqualsBdpt, PointCaustic) {
       return render_langevin(loaded.scene, options, render, 300).image;
     });
     test::expect_equal_tiles("point_caustic", sampled, traced, 0.03);
+  }
+}
+
+/// The same by mutations of vertices.
+TEST(MutationsEqualBdpt, DISABLED_PointCaustic) {
+  const LoadedScene loaded = load_small("point_caustic");
+  const auto traced = tiles_over_runs([&](std::uint64_t seed) {
+    RenderOptions render;
+    render.seed = 1000 + seed;
+    return render_bdpt(loaded.scene, BdptOptions{loaded.max_depth.value()}, render, 300).image;
+  });
+  for (const char* name : {"mlt", "erpt"}) {
+    const auto sampled = tiles_over_runs([&](std::uint64_t seed) {
+      return render_by_mutations(loaded, name, DirectLight::Apart, 200000, 300, seed);
+    });
+    test::expect_equal_tiles(name, sampled, traced, 0.03);
   }
 }
 

@@ -260,21 +260,70 @@ std::vector<double> run_chain(const Target& target, const KernelOptions& options
   return sums;
 }
 
-/// Smallest p-value of the observables over independent chains.
+/// How a second step is accepted after a refused first one.
+enum class Ghost { Counted, Forgotten };
+
+/// Delayed rejection from x by y and z at a scale: a2, with the ghost's densities or without.
+template <class State>
+double log_second_acceptance(const State& x, const State& y, const State& z, double scale,
+                             double second_scale, Ghost ghost = Ghost::Counted) {
+  const auto refused = [&](const State& from) {
+    const double there = log_pdf(from, from.step, y.x, scale);
+    const double back = log_pdf(y, y.step, from.x, scale);
+    return log_refused(there, log_acceptance(from.log_target, y.log_target, there, back));
+  };
+  const bool counted = ghost == Ghost::Counted;
+  return log_acceptance(
+      x.log_target + (counted ? refused(x) : 0.0), z.log_target + (counted ? refused(z) : 0.0),
+      log_pdf(x, x.step, z.x, second_scale * scale), log_pdf(z, z.step, x.x, second_scale * scale));
+}
+
+/// As run_chain, with second steps.
 template <class Target>
-double smallest_p_value(const Target& target, const KernelOptions& options, Reverse reverse,
-                        int chains, int steps) {
+std::vector<double> run_delayed_chain(const Target& target, const KernelOptions& options,
+                                      double second_scale, Ghost ghost, int steps, Rng& rng) {
+  const auto observables = target.observables();
+  std::vector<double> sums(observables.size());
+  auto x = target.prepare(options, target.draw(rng));
+  for (int i = 0; i < steps; ++i) {
+    const double scale = draw_scale(options, rng);
+    const auto y = target.prepare(options, x.move(x.step.sample(scale, rng)));
+    const double first = log_acceptance(x.log_target, y.log_target, log_pdf(x, x.step, y.x, scale),
+                                        log_pdf(y, y.step, x.x, scale));
+    if (rng.uniform() < std::exp(first)) {
+      x = y;
+    } else {
+      const auto z = target.prepare(options, x.move(x.step.sample(second_scale * scale, rng)));
+      const double second = log_second_acceptance(x, y, z, scale, second_scale, ghost);
+      if (rng.uniform() < std::exp(second)) x = z;
+    }
+    for (std::size_t k = 0; k < sums.size(); ++k) sums[k] += observables[k].f(x.x);
+  }
+  for (double& sum : sums) sum /= steps;
+  return sums;
+}
+
+/// Smallest p-value of the observables over independent chains; run(rng) returns their means.
+template <class Target, class Run>
+double smallest_p_value_of(const Target& target, int chains, const Run& run) {
   const auto observables = target.observables();
   std::vector<Moments> moments(observables.size());
   for (int chain = 0; chain < chains; ++chain) {
     Rng rng(52, Stream::Test, static_cast<std::uint64_t>(chain));
-    const std::vector<double> means = run_chain(target, options, reverse, steps, rng);
+    const std::vector<double> means = run(rng);
     for (std::size_t k = 0; k < means.size(); ++k) moments[k].add(means[k]);
   }
   double smallest = 1;
   for (std::size_t k = 0; k < moments.size(); ++k)
     smallest = std::min(smallest, student_p_value(moments[k], observables[k].expected));
   return smallest;
+}
+
+template <class Target>
+double smallest_p_value(const Target& target, const KernelOptions& options, Reverse reverse,
+                        int chains, int steps) {
+  return smallest_p_value_of(
+      target, chains, [&](Rng& rng) { return run_chain(target, options, reverse, steps, rng); });
 }
 
 KernelOptions options_of(Drift drift, double scale, double decades) {
@@ -323,6 +372,41 @@ TEST(Stationarity, WrongReverseDensityFails) {
   }
 }
 
+// Law: delayed rejection leaves both targets as they are, for every drift.
+TEST(Stationarity, DelayedRejection) {
+  const GaussianTarget gaussian;
+  const SphereTarget spheres;
+  const double significance = sidak(
+      0.01, 3 * static_cast<int>(gaussian.observables().size() + spheres.observables().size()));
+  for (const Drift drift : kDrifts) {
+    const KernelOptions wide = options_of(drift, 4.0, 1.0);
+    EXPECT_GT(smallest_p_value_of(gaussian, 48,
+                                  [&](Rng& rng) {
+                                    return run_delayed_chain(gaussian, wide, 0.3, Ghost::Counted,
+                                                             2000, rng);
+                                  }),
+              significance)
+        << name(drift);
+    EXPECT_GT(smallest_p_value_of(spheres, 48,
+                                  [&](Rng& rng) {
+                                    return run_delayed_chain(spheres, wide, 0.3, Ghost::Counted,
+                                                             400, rng);
+                                  }),
+              significance)
+        << name(drift);
+  }
+}
+
+// Law: that test has teeth. A second step that takes no account of the first one fails it.
+TEST(Stationarity, ForgottenGhostFails) {
+  const GaussianTarget target;
+  const KernelOptions options = options_of(Drift::None, 3.0, 0.0);
+  const auto run = [&](Rng& rng) {
+    return run_delayed_chain(target, options, 0.5, Ghost::Forgotten, 3000, rng);
+  };
+  EXPECT_LT(smallest_p_value_of(target, 64, run), 1e-8);
+}
+
 /// pi(x) p(x -> y) a(x -> y) = pi(y) p(y -> x) a(y -> x) for pairs drawn by the kernel.
 template <class Target>
 void check_detailed_balance(const Target& target) {
@@ -350,6 +434,46 @@ void check_detailed_balance(const Target& target) {
     EXPECT_GT(doubtful, 50);
   }
 }
+
+/// pi(x) p1(y | x) (1 - a1(x, y)) p2(z | x) a2(x, y, z) is the same with x and z exchanged, for
+/// ghosts y and pairs drawn by the kernel.
+template <class Target>
+void check_delayed_balance(const Target& target) {
+  constexpr double kSecond = 0.4;
+  for (const Drift drift : kDrifts) {
+    const KernelOptions options = options_of(drift, 2.0, 1.0);
+    int doubtful = 0;
+    for (std::uint64_t i = 0; i < 500; ++i) {
+      Rng rng(55, Stream::Test, i);
+      const auto x = target.prepare(options, target.draw(rng));
+      const double scale = draw_scale(options, rng);
+      const auto y = target.prepare(options, x.move(x.step.sample(scale, rng)));
+      const auto z = target.prepare(options, x.move(x.step.sample(kSecond * scale, rng)));
+      const auto flow = [&](const auto& from, const auto& to) {
+        const double there = log_pdf(from, from.step, y.x, scale);
+        const double back = log_pdf(y, y.step, from.x, scale);
+        const double a = log_acceptance(from.log_target, y.log_target, there, back);
+        return from.log_target + there + std::log1p(-std::exp(a)) +
+               log_pdf(from, from.step, to.x, kSecond * scale) +
+               log_second_acceptance(from, y, to, scale, kSecond);
+      };
+      const double forward = flow(x, z);
+      const double reverse = flow(z, x);
+      if (!std::isfinite(forward) || !std::isfinite(reverse)) {
+        EXPECT_FALSE(std::isfinite(forward) && forward > -600.0);
+        EXPECT_FALSE(std::isfinite(reverse) && reverse > -600.0);
+        continue;
+      }
+      ++doubtful;
+      EXPECT_NEAR(forward, reverse, 1e-9 * (1.0 + std::abs(forward)));
+    }
+    EXPECT_GT(doubtful, 50);
+  }
+}
+
+// Law: the flow between any two states is the same in both directions, by any ghost.
+TEST(DetailedBalance, DelayedGaussian) { check_delayed_balance(GaussianTarget()); }
+TEST(DetailedBalance, DelayedProductOfSpheres) { check_delayed_balance(SphereTarget()); }
 
 // Law: the flow between any two states is the same in both directions.
 TEST(DetailedBalance, Gaussian) { check_detailed_balance(GaussianTarget()); }

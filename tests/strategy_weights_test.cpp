@@ -19,6 +19,7 @@ namespace {
 
 /// A path with its light end. Directions v_k lead from x_k to x_(k+1).
 struct GivenPath {
+  Vec3d coordinate;                    ///< of the sensor's ray
   std::vector<SurfaceHit> scattering;  ///< x_1 .. x_(n-1), wi toward the sensor
   std::vector<Vec3d> v;                ///< v_0 .. v_(n-1)
   LightEnd end;
@@ -31,8 +32,9 @@ struct GivenPath {
   bool infinite() const { return end.at_infinity(); }
   double inverse_r2(const Scene& scene, int k) const {  // of edge k
     if (k + 1 == length() && infinite()) return 1.0;
-    const Vec3d from = k == 0 ? scene.camera().origin : x(k).at.p;
-    return 1.0 / ((k + 1 == length() ? end.p : x(k + 1).at.p) - from).squaredNorm();
+    const Vec3d& to = k + 1 == length() ? end.p : x(k + 1).at.p;
+    if (k == 0) return 1.0 / scene.camera().spread(coordinate, to);
+    return 1.0 / (to - x(k).at.p).squaredNorm();
   }
   /// With v_k at the light end.
   double end_cosine() const {
@@ -56,6 +58,7 @@ std::optional<GivenPath> draw_path(const TestScene& test, Rng& rng) {
   const auto escape = tracer.trace(Walk::FromSensor, tracer.leave_sensor(v), RayFollower(scene, v),
                                    test.max_depth, rng, subpath);
   GivenPath path;
+  path.coordinate = v;
   const int last = static_cast<int>(rng.uniform() * (subpath.size() + 1));
   if (last < subpath.size()) {
     for (int i = 0; i <= last; ++i) {
@@ -96,7 +99,7 @@ std::optional<GivenPath> draw_path(const TestScene& test, Rng& rng) {
 /// Vertices x_1, x_2, .. as walked from the sensor, up to the light end.
 std::vector<Departure> walk_from_sensor(const SubpathTracer& tracer, const GivenPath& path,
                                         std::vector<SubpathVertex>& vertices) {
-  std::vector<Departure> departures{tracer.leave_sensor(path.direction(0))};
+  std::vector<Departure> departures{tracer.leave_sensor(path.coordinate)};
   for (int k = 1; k < path.length(); ++k) {
     vertices.push_back(tracer.arrive(departures.back(), path.x(k)));
     departures.push_back(
@@ -167,7 +170,7 @@ std::vector<double> weights_by_walking(const Scene& scene, const EmissionGuide& 
       const Vec3d& v = path.direction(0);
       SensorConnection seen;
       seen.wi = -v;
-      seen.density = std::exp(scene.camera().log_importance(v)) *
+      seen.density = std::exp(scene.camera().log_importance(path.coordinate)) *
                      std::abs(path.x(1).at.n_g.dot(v)) * path.inverse_r2(scene, 0);
       w = weights.sensor(from_light(1), seen);
     }
@@ -207,7 +210,7 @@ Densities densities(const Scene& scene, const EmissionGuide& guide, const GivenP
                                    : std::abs(path.x(k).at.n_g.dot(path.direction(e)));
     return std::log(cosine * path.inverse_r2(scene, e));
   };
-  p.sensor[1] = scene.camera().log_importance(path.direction(0)) + geometry(1, 0);
+  p.sensor[1] = scene.camera().log_importance(path.coordinate) + geometry(1, 0);
   p.light[index(n)] = std::log(path.end.density);
   p.light[index(n - 1)] =
       std::log(emission_density(scene, path.end, path.end_cosine(), path.falloff()) *

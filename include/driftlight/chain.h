@@ -33,12 +33,17 @@ class Chain {
 
  private:
   ChainState& current() { return states_[current_]; }
-  ChainState& proposed() { return states_[1 - current_]; }
+  ChainState& proposed() { return states_[proposed_]; }
   /// Each returns the acceptance probability; none if there is no valid proposal.
   std::optional<double> propose_large();
   std::optional<double> propose_small();
-  /// Moves with this probability; true if it moved.
-  bool resolve(double acceptance);
+  /// Delayed rejection: a small step, and where it is refused a second one.
+  void take_delayed_step();
+  /// The acceptance probability of a second step, behind the ghost that is the proposed state,
+  /// valid or not, accepted with this probability.
+  double propose_second(double first_acceptance, bool valid);
+  /// Moves with this probability to the state of this index; true if it moved.
+  bool resolve(double acceptance, std::size_t index);
 
   const Scene& scene_;
   const PathSampler& sampler_;
@@ -46,9 +51,12 @@ class Chain {
   SmallStep small_step_;
   Film& film_;
   Rng rng_;
-  ChainState states_[2];
+  ChainState states_[3];
   std::size_t current_ = 0;
-  double gathered_ = 0;  ///< weight of the current state not yet splatted
+  std::size_t proposed_ = 1;
+  std::size_t second_ = 2;              ///< proposed by a second step
+  std::optional<double> second_scale_;  ///< of delayed rejection
+  double gathered_ = 0;                 ///< weight of the current state not yet splatted
   StepLayers* layers_;
   LangevinStatistics statistics_;
   RunningMean weights_;

@@ -111,6 +111,11 @@ struct LangevinOptions {
   std::optional<double> large_step_probability;
   LargeSteps large_steps = LargeSteps::Bdpt;
   DirectLight direct = DirectLight::Apart;
+  /// Of Mode::Chain: a rejected small step is followed by a second one, `second_scale` times its
+  /// scale (Rioux-Lavoie et al. 2020, "Delayed rejection Metropolis light transport"; Tierney and
+  /// Mira 1999; Green and Mira 2001).
+  bool delayed_rejection = false;
+  double second_scale = 0.2;
   /// Independent chains, whatever the number of threads.
   int chains = 128;
   /// Samples that estimate the normalization b and start the chains.
@@ -210,6 +215,41 @@ struct LmcOptions : GaussianStepOptions {
   void validate() const;
 };
 
+/// Mutations of a path by its vertices (Veach and Guibas 1997): steps of the perturbations.
+struct PerturbationOptions {
+  /// Sizes between which they are drawn log-uniformly, in widths of the film; directions move by
+  /// the angle that so much of the field of view is.
+  double step_min = 1.0 / 2048.0;
+  double step_max = 1.0 / 10.0;
+  DirectLight direct = DirectLight::Apart;
+  /// Longest path, in edges.
+  int max_depth = 12;
+};
+/// Metropolis light transport (Veach and Guibas 1997).
+struct MltOptions : PerturbationOptions {
+  /// Probability of a bidirectional mutation; the others are perturbations.
+  double bidirectional_probability = 0.3;
+  /// Independent chains, whatever the number of threads.
+  int chains = 128;
+  /// Samples that estimate the normalization b and start the chains.
+  int bootstrap = 500000;
+
+  /// Throws OptionError.
+  void validate() const;
+};
+/// Energy redistribution path tracing (Cline, Talbot and Egbert 2005).
+struct ErptOptions : PerturbationOptions {
+  /// Mutations of a chain.
+  int chain_length = 100;
+  /// Mutations for each bidirectional sample, in the mean.
+  double mutations_per_sample = 100;
+  /// Samples that find how much light each mutation deposits.
+  int pilot = 65536;
+
+  /// Throws OptionError.
+  void validate() const;
+};
+
 /// As options name it.
 std::string_view name_of(PhaseSpace phase_space);
 
@@ -230,6 +270,8 @@ std::vector<OptionEntry> entries(LightOptions& options);
 std::vector<OptionEntry> entries(PrimaryOptions& options);
 std::vector<OptionEntry> entries(H2mcOptions& options);
 std::vector<OptionEntry> entries(LmcOptions& options);
+std::vector<OptionEntry> entries(MltOptions& options);
+std::vector<OptionEntry> entries(ErptOptions& options);
 
 /// Sets `name` to `value`. Throws OptionError naming the option and the valid ones or values.
 void set_option(const std::vector<OptionEntry>& entries, const std::string& name,

@@ -102,6 +102,7 @@ struct LevelFigures {
 struct LangevinStatistics {
   KernelStatistics large_step;
   KernelStatistics small_step;
+  KernelStatistics second_step;       ///< those that follow a rejected small one
   double large_step_probability = 0;  ///< that was used
   Rejections rejections;
   /// Mutations spent at paths of n edges.
@@ -175,6 +176,21 @@ LangevinResult render_h2mc(const Scene& scene, const H2mcOptions& options,
 /// render_langevin.
 LangevinResult render_lmc(const Scene& scene, const LmcOptions& options,
                           const RenderOptions& render, double mutations_per_pixel);
+
+/// Renders with Metropolis light transport (Veach and Guibas 1997, "Metropolis light transport";
+/// Veach 1997, ch. 11): chains of paths by their vertices, with bidirectional mutations and lens,
+/// caustic and multi-chain perturbations. Statistics as of Mode::Chain, the bidirectional mutations
+/// as large steps and the perturbations as small ones. Throws as render_langevin.
+LangevinResult render_mlt(const Scene& scene, const MltOptions& options,
+                          const RenderOptions& render, double mutations_per_pixel);
+
+/// Renders with energy redistribution path tracing (Cline, Talbot and Egbert 2005, "Energy
+/// redistribution path tracing"), from bidirectional samples: a path that one of them finds starts
+/// as many chains of perturbations, as of render_mlt, as its light pays for, since each mutation
+/// deposits the same. Unbiased, without normalization. `samples_per_pixel` is the work if no time
+/// is given. Statistics as of Mode::Redistribution. Throws as render_langevin.
+LangevinResult render_erpt(const Scene& scene, const ErptOptions& options,
+                           const RenderOptions& render, int samples_per_pixel);
 
 /// Of an integrator whose samples are independent.
 struct PathResult {

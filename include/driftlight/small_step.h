@@ -32,6 +32,14 @@ struct ChainState {
 double log_acceptance(double log_target_from, double log_target_to, double log_pdf_forward,
                       double log_pdf_reverse);
 
+/// log of p1(y | x) (1 - a1(x, y)), the density of a first proposal that is refused: the ghost y of
+/// delayed rejection. With it second proposals z, drawn from p2(z | x) whatever y was, are accepted
+/// with probability
+///   min(1, pi(z) p1(y | z) (1 - a1(z, y)) p2(x | z) / (pi(x) p1(y | x) (1 - a1(x, y)) p2(z | x)))
+/// (Tierney and Mira 1999; Green and Mira 2001): log_acceptance of the targets times the ghost's
+/// densities. -infinity where the first proposal is certainly accepted.
+double log_refused(double log_pdf, double log_first_acceptance);
+
 /// Chart and step distribution of a state, by the kernel's options. A state whose derivatives are
 /// not finite has no step, from or to it: a function of the state, so the balance holds.
 void prepare_step(const Scene& scene, const KernelOptions& options, ChainState& state);
@@ -53,19 +61,27 @@ class SmallStep {
   /// Draws a step from `from` and traces and evaluates where it leads; what makes it fail is
   /// counted.
   bool propose(ChainState& from, ChainState& to, Rng& rng, Rejections& rejections);
+  /// The same by a second step from the same state, `factor` times the scale of the one before.
+  bool propose_again(ChainState& from, ChainState& to, double factor, Rng& rng,
+                     Rejections& rejections);
   /// Those of the step just proposed; none if either is 0.
   std::optional<LogDensities> log_densities(ChainState& from, ChainState& to,
                                             Rejections& rejections);
+  /// log p(to | from) of a state whose step is prepared and finite, at the scale of the first step,
+  /// whether or not a path has those coordinates; -infinity beyond the horizon.
+  double log_first_density(const ChainState& from, const PathCoordinates& to) const;
   /// Counts the step just proposed from `from` in the layers.
   void record(ChainState& from, double acceptance, StepLayers& layers) const;
 
  private:
   void prepare(ChainState& state);
+  bool step(ChainState& from, ChainState& to, Rng& rng, Rejections& rejections);
 
   const Scene& scene_;
   const KernelOptions& options_;
   GradientProbe* probe_ = nullptr;
-  double scale_ = 0;
+  double first_scale_ = 0;
+  double scale_ = 0;  ///< of the step just proposed
 };
 
 }  // namespace driftlight

@@ -150,7 +150,8 @@ void run(const IntegratorsCommand& /*command*/) {
       describe_integrator<LangevinOptions>(
           "langevin",
           "Metropolis-adjusted Langevin sampling of light paths (Ershov, Frolov, Nikolaev and "
-          "Voloboy 2023, doi 10.20948/prepr-2023-63)") +
+          "Voloboy 2023, doi 10.20948/prepr-2023-63); delayed_rejection after Tierney and Mira "
+          "1999, Green and Mira 2001, and Rioux-Lavoie et al. 2020, doi 10.1145/3388538") +
       describe_integrator<PssmltOptions>(
           "pssmlt",
           "primary sample space Metropolis light transport with bidirectional path tracing "
@@ -167,6 +168,15 @@ void run(const IntegratorsCommand& /*command*/) {
           "lmc",
           "mmlt with Langevin steps and a diagonal preconditioner that adapts to gradients (Luan, "
           "Zhao, Bala and Gkioulekas 2020, doi 10.1145/3386569.3392382)") +
+      describe_integrator<MltOptions>(
+          "mlt",
+          "Metropolis light transport by bidirectional mutations and lens, caustic and multi-chain "
+          "perturbations of paths (Veach and Guibas 1997, doi 10.1145/258734.258775)") +
+      describe_integrator<ErptOptions>(
+          "erpt",
+          "energy redistribution path tracing: bidirectional samples whose light short chains of "
+          "the perturbations of mlt spread (Cline, Talbot and Egbert 2005, "
+          "doi 10.1145/1073204.1073330)") +
       describe_integrator<PathOptions>(
           "path",
           "path tracing with next-event estimation (Kajiya 1986, doi 10.1145/15922.15902; "

@@ -46,6 +46,16 @@ LangevinResult result_of(const Scene& scene, const LmcOptions& options, const Re
   return render_lmc(scene, options, how, mutations(work));
 }
 
+LangevinResult result_of(const Scene& scene, const MltOptions& options, const RenderOptions& how,
+                         const Work& work) {
+  return render_mlt(scene, options, how, mutations(work));
+}
+
+LangevinResult result_of(const Scene& scene, const ErptOptions& options, const RenderOptions& how,
+                         const Work& work) {
+  return render_erpt(scene, options, how, samples(work));
+}
+
 PathResult result_of(const Scene& scene, const PathOptions& options, const RenderOptions& how,
                      const Work& work) {
   return render_path(scene, options, how, samples(work));
@@ -67,6 +77,8 @@ std::string_view name_of(const PssmltOptions& /*options*/) {
 std::string_view name_of(const MmltOptions& /*options*/) { return cli::name_of(Integrator::Mmlt); }
 std::string_view name_of(const H2mcOptions& /*options*/) { return cli::name_of(Integrator::H2mc); }
 std::string_view name_of(const LmcOptions& /*options*/) { return cli::name_of(Integrator::Lmc); }
+std::string_view name_of(const MltOptions& /*options*/) { return cli::name_of(Integrator::Mlt); }
+std::string_view name_of(const ErptOptions& /*options*/) { return cli::name_of(Integrator::Erpt); }
 std::string_view name_of(const PathOptions& /*options*/) { return cli::name_of(Integrator::Path); }
 std::string_view name_of(const BdptOptions& /*options*/) { return cli::name_of(Integrator::Bdpt); }
 std::string_view name_of(const LightOptions& /*options*/) {
@@ -95,6 +107,10 @@ IntegratorOptions options_of(Integrator integrator) {
       return H2mcOptions{};
     case Integrator::Lmc:
       return LmcOptions{};
+    case Integrator::Mlt:
+      return MltOptions{};
+    case Integrator::Erpt:
+      return ErptOptions{};
     case Integrator::Path:
       return PathOptions{};
     case Integrator::Bdpt:
@@ -132,7 +148,10 @@ bool counts_mutations(const IntegratorOptions& options) {
   if (const auto* langevin = std::get_if<LangevinOptions>(&options))
     return langevin->mode == Mode::Chain;
   return std::visit(
-      [](const auto& of) { return std::is_base_of_v<PrimaryOptions, std::decay_t<decltype(of)>>; },
+      [](const auto& of) {
+        using Options = std::decay_t<decltype(of)>;
+        return std::is_base_of_v<PrimaryOptions, Options> || std::is_same_v<Options, MltOptions>;
+      },
       options);
 }
 

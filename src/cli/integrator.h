@@ -18,8 +18,9 @@
 namespace driftlight::cli {
 
 /// In the order of `Integrator`.
-using IntegratorOptions = std::variant<LangevinOptions, PssmltOptions, MmltOptions, H2mcOptions,
-                                       LmcOptions, PathOptions, BdptOptions, LightOptions>;
+using IntegratorOptions =
+    std::variant<LangevinOptions, PssmltOptions, MmltOptions, H2mcOptions, LmcOptions, MltOptions,
+                 ErptOptions, PathOptions, BdptOptions, LightOptions>;
 
 /// The defaults.
 IntegratorOptions options_of(Integrator integrator);

@@ -107,15 +107,15 @@ void report_chains(const std::string& integrator, const LangevinStatistics& s, c
                     s.direct_samples_per_pixel, s.direct_seconds));
 }
 
-void report_redistribution(const LangevinStatistics& s, const Image& image, Report& report) {
+void report_redistribution(const std::string& integrator, const LangevinStatistics& s,
+                           const Image& image, Report& report) {
   report.empty = !(s.samples_per_pixel > 0.0);
   report.statistics.update({{"samples_per_pixel", s.samples_per_pixel},
                             {"starts", s.starts},
                             {"remainder", s.remainder}});
   report.summary = {
-      fmt::format("langevin: {} x {} pixels, {:.4g} samples and {:.4g} mutations per pixel in "
-                  "{:.2f} s",
-                  image.width, image.height, s.samples_per_pixel,
+      fmt::format("{}: {} x {} pixels, {:.4g} samples and {:.4g} mutations per pixel in {:.2f} s",
+                  integrator, image.width, image.height, s.samples_per_pixel,
                   static_cast<double>(s.mutations) / pixel_count(image), s.render_seconds),
       fmt::format("mean {:.6g}, {:.2f} % of it by chains from {} samples", s.b,
                   s.b > 0.0 ? 100.0 * s.remainder / s.b : 0.0, s.starts)};
@@ -194,7 +194,11 @@ Report metropolis_report(const std::string& integrator, const LangevinResult& re
          {"hastings", s.rejections.hastings}}},
        {"seconds", {{"bootstrap", s.bootstrap_seconds}, {"render", s.render_seconds}}}});
   report.details = {describe("large steps", s.large_step), describe("small steps", s.small_step),
-                    describe(s.rejections, s.small_step.proposed)};
+                    describe(s.rejections, s.small_step.proposed + s.second_step.proposed)};
+  if (s.second_step.proposed > 0) {
+    report.statistics["kernels"]["second_step"] = to_json(s.second_step);
+    report.details.push_back(describe("second steps", s.second_step));
+  }
   return report;
 }
 
@@ -209,7 +213,7 @@ Report make_report(const LangevinResult& result, const LangevinOptions& options,
     report.statistics["path_lengths"] = s.path_length;
     report.details.push_back(path_lengths(s));
   } else {
-    report_redistribution(s, result.image, report);
+    report_redistribution("langevin", s, result.image, report);
   }
   if (options.mode == Mode::Splitting) report_splitting(s, report);
   if (result.gradient_check) report_check(*result.gradient_check, report);
@@ -219,7 +223,10 @@ Report make_report(const LangevinResult& result, const LangevinOptions& options,
 Report make_report(const std::string& integrator, const LangevinResult& result,
                    const std::vector<OptionEntry>& entries, const RenderOptions& render) {
   Report report = metropolis_report(integrator, result, entries, render);
-  report_chains(integrator, result.statistics, result.image, report);
+  if (result.statistics.samples_per_pixel > 0.0)
+    report_redistribution(integrator, result.statistics, result.image, report);
+  else
+    report_chains(integrator, result.statistics, result.image, report);
   return report;
 }
 

@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Energy redistribution path tracing (Cline, Talbot and Egbert 2005).
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <vector>
+
+#include "direct_pass.h"
+#include "driftlight/error.h"
+#include "driftlight/film.h"
+#include "exact_sum.h"
+#include "pass_loop.h"
+#include "sample_film.h"
+#include "veach_chain.h"
+#include "vertex_path.h"
+
+namespace driftlight {
+namespace {
+
+/// Most chains that start from one path, and how much longer than usual they may become.
+constexpr double kMostChainsOfPath = 16;
+constexpr double kMostLengthening = 16;
+
+/// What all samples of a render share.
+struct Energy {
+  const Scene& scene;
+  const ErptOptions& options;
+  EmissionGuide unguided;
+  int min_edges;  ///< of paths whose light is left to chains
+  PathMutation mutation;
+  Film film;       ///< of the chains, in units of `unit`
+  double deposit;  ///< e_d, of a mutation
+  double unit;     ///< so bright that fixed point does not overflow
+
+  Energy(const Scene& of_scene, const ErptOptions& with, std::uint64_t seed)
+      : scene(of_scene),
+        options(with),
+        unguided(scene),
+        min_edges(options.direct == DirectLight::Apart ? kDirectDepth + 1 : 1),
+        mutation(scene, {min_edges, options.max_depth, options.step_min, options.step_max}),
+        film(scene.camera().film_width, scene.camera().film_height, scene.camera().filter),
+        deposit(mean_of_samples(seed) / options.mutations_per_sample),
+        unit(1024.0 * (deposit > 0.0 ? deposit : 1.0)) {}
+
+  bool is_for_chains(const FoundPath& path) const { return path.s + path.t - 1 >= min_edges; }
+  BidirectionalTracer tracer() const {
+    return {scene, unguided, MisHeuristic::Balance, options.max_depth};
+  }
+
+  void count(const LangevinStatistics& more) {
+    accepted_.add(more.small_step.accepted);
+    const std::lock_guard lock(mutex_);
+    statistics_.small_step.proposed += more.small_step.proposed;
+    statistics_.rejections += more.rejections;
+    statistics_.starts += more.starts;
+  }
+  /// Of the chains.
+  LangevinStatistics statistics() const {
+    LangevinStatistics result = statistics_;
+    result.small_step.accepted = accepted_.value();
+    result.mutations = result.small_step.proposed;
+    return result;
+  }
+
+ private:
+  /// Adds up what a sample finds for the chains.
+  struct SumSink {
+    const Energy& energy;
+    double sum = 0;
+
+    void add(const Rgbd& value, const FoundPath& path) {
+      const double y = luminance(value);
+      if (energy.is_for_chains(path) && std::isfinite(y)) sum += y;
+    }
+    void splat(const Vec2d&, const Rgbd& value, const FoundPath& path) { add(value, path); }
+  };
+
+  /// Mean over the samples of a pilot of what they find for the chains.
+  double mean_of_samples(std::uint64_t seed) const {
+    constexpr std::size_t kTask = 256;
+    const auto count = static_cast<std::size_t>(options.pilot);
+    std::vector<double> sums((count + kTask - 1) / kTask);
+    tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t task) {
+      BidirectionalTracer samples = tracer();
+      SumSink sink{*this};
+      for (std::size_t i = task * kTask; i < std::min((task + 1) * kTask, count); ++i) {
+        Rng rng(seed, Stream::Pilot, i);
+        const Vec2d at = rng.uniform2();
+        samples.sample(at, rng, sink);
+      }
+      sums[task] = sink.sum;
+    });
+    double total = 0;
+    for (const double sum : sums) total += sum;
+    return total / static_cast<double>(count);
+  }
+
+  ExactSum accepted_;
+  std::mutex mutex_;
+  LangevinStatistics statistics_;
+};
+
+/// One bidirectional sample, and the chains that start from the paths that it finds.
+class EnergySampler {
+ public:
+  explicit EnergySampler(Energy& energy) : energy_(energy), tracer_(energy.tracer()) {}
+
+  void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& film_sink) {
+    starts_.clear();
+    Sink sink{*this, film, film_sink};
+    tracer_.sample(film, rng, sink);
+    LangevinStatistics statistics;
+    for (const Start& start : starts_) redistribute(start, rng, statistics);
+    if (!starts_.empty()) energy_.count(statistics);
+  }
+
+ private:
+  struct Start {
+    VertexPath path;
+    double value;  ///< luminance of what the sample is worth
+  };
+
+  struct Sink {
+    EnergySampler& sampler;
+    Vec2d film;
+    SampleFilm::Sink& film_sink;
+
+    void add(const Rgbd& value, const FoundPath& path) {
+      if (!sampler.keep(value, path)) film_sink.add(value);
+    }
+    void splat(const Vec2d& at, const Rgbd& value, const FoundPath& path) {
+      if (!sampler.keep(value, path)) film_sink.splat(at, value);
+    }
+  };
+
+  /// Whether the path is left to chains.
+  bool keep(const Rgbd& value, const FoundPath& path) {
+    const double y = luminance(value);
+    if (!energy_.is_for_chains(path) || !(energy_.deposit > 0.0) || !std::isfinite(y)) return false;
+    if (!(y > 0.0)) return true;
+    starts_.push_back({vertex_path(path), y});
+    if (starts_.back().path.evaluate(energy_.scene)) return true;
+    starts_.pop_back();
+    return false;
+  }
+
+  /// Mutations that deposit e_d each; if they would be too many, longer chains, and if these are
+  /// too long, mutations that deposit more.
+  void redistribute(const Start& start, Rng& rng, LangevinStatistics& statistics) {
+    const double length = energy_.options.chain_length;
+    double deposit = energy_.deposit;
+    double mutations = length;
+    double chains = std::floor(start.value / (deposit * length) + rng.uniform());
+    if (chains > kMostChainsOfPath) {
+      mutations = std::ceil(
+          std::min(start.value / (deposit * kMostChainsOfPath), kMostLengthening * length));
+      chains = kMostChainsOfPath;
+      deposit = start.value / (mutations * chains);
+    }
+    if (chains > 0.0) ++statistics.starts;
+    for (double i = 0; i < chains; ++i)
+      run(start.path, static_cast<std::uint64_t>(mutations), deposit / energy_.unit, rng,
+          statistics);
+  }
+
+  void run(const VertexPath& start, std::uint64_t mutations, double weight, Rng& rng,
+           LangevinStatistics& statistics) {
+    const VertexPath* from = &start;
+    VertexPath* to = &paths_[0];
+    double gathered = 0;
+    const auto splat = [&](const VertexPath& at, double share) {
+      const Contribution& value = at.contribution();
+      if (share > 0.0) energy_.film.splat(value.film, value.color, share * weight);
+    };
+    for (std::uint64_t i = 0; i < mutations; ++i) {
+      const double acceptance = perturb(energy_.mutation, *from, *to, rng, statistics.rejections);
+      ++statistics.small_step.proposed;
+      statistics.small_step.accepted += acceptance;
+      gathered += 1.0 - acceptance;
+      if (rng.uniform() < acceptance) {
+        splat(*from, gathered);
+        from = to;
+        to = to == &paths_[0] ? &paths_[1] : &paths_[0];
+        gathered = acceptance;
+      } else {
+        splat(*to, acceptance);
+        if (acceptance > 0.0) ++statistics.rejections.hastings;
+      }
+    }
+    splat(*from, gathered);
+  }
+
+  Energy& energy_;
+  BidirectionalTracer tracer_;
+  std::array<VertexPath, 2> paths_;
+  std::vector<Start> starts_;
+};
+
+}  // namespace
+
+LangevinResult render_erpt(const Scene& scene, const ErptOptions& options,
+                           const RenderOptions& render, int samples_per_pixel) {
+  options.validate();
+  require_pinhole(scene, "erpt");
+  LangevinResult result;
+  tbb::task_arena arena(render.threads > 0 ? render.threads : tbb::task_arena::automatic);
+  arena.execute([&] {
+    RenderClock clock(render);
+    Energy energy(scene, options, render.seed);
+    const double pilot_seconds = clock.seconds();
+    SampleFilm film(scene.camera(), render.seed, 0);
+    const EnergySampler sampler(energy);
+    const auto by_chains = [&](double passes) {
+      return energy.film.develop(energy.unit / std::max(1.0, passes));
+    };
+    PathResult samples = run_passes(
+        render, clock, samples_per_pixel, [&](std::uint64_t index) { film.pass(index, sampler); },
+        [&](double passes) {
+          Image image = film.image(passes);
+          const Image chains = by_chains(passes);
+          for (std::size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] += chains.rgb[i];
+          return image;
+        });
+    result.image = std::move(samples.image);
+    result.statistics = energy.statistics();
+    result.statistics.b = mean_luminance(result.image);
+    if (!(result.statistics.b > 0.0) && !samples.stopped)
+      throw InputError("no path from the sensor to an emitter carries light");
+    result.statistics.remainder = mean_luminance(by_chains(samples.samples_per_pixel));
+    result.statistics.samples_per_pixel = samples.samples_per_pixel;
+    result.statistics.stopped = samples.stopped;
+    result.statistics.bootstrap_seconds = pilot_seconds;
+    result.statistics.render_seconds = samples.render_seconds;
+  });
+  return result;
+}
+
+}  // namespace driftlight

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+/// Mutations of a path by its vertices: E. Veach and L. Guibas, "Metropolis light transport",
+/// SIGGRAPH 1997, and Veach's thesis, 1997, ch. 11.
+///
+/// - Bidirectional: of x the first a vertices and the last b are kept, the others are deleted, and
+///   N new ones are put in their place, i of them from the sensor's side and N - i from the light's
+///   by BSDF and emitter sampling, the two ends then joined by an edge. With b = 0 the last one is
+///   a point drawn on an emitter, or for i = N one that a ray has hit. For given a and b the same y
+///   can come of each i, so that with A_k and B_k of vertex_path.h
+///     T(y | x) = p(a, b | n_x) p(N | a, b, N_x) 1 / (N + 1)
+///                  sum_i prod_(a <= k < a + i) A_k(y)  prod_(a + i <= k <= n_y - b) B_k(y),
+///   over those i whose joining edge has a delta vertex at neither end. The balance is detailed
+///   for each pair (a, b) by itself.
+/// - Lens: the film point moves; the ray follows the delta lobes of x up to the first vertex that
+///   scatters otherwise, which is joined to the next one of x.
+/// - Multi-chain: the same where that next vertex is a delta one. The direction toward it moves,
+///   the ray follows the delta lobes, and so on up to a vertex that can be joined to the next one
+///   of x, or to the emitter that a delta lobe leads to.
+/// - Caustic: of E D S* (D|L) E, x_1 scatters other than by a delta lobe, and x_m is the first of
+///   x_2, .. that does so, or the emitter. The direction at x_m toward the sensor moves (of light
+///   from infinity its place across it), the ray follows the delta lobes of x to a new x_1, which
+///   is joined to the sensor.
+/// Moves are isotropic, by a step whose density depends on its size alone; it cancels. What is left
+/// of T(y | x) are the factors that turn film, solid angle and delta lobes into area,
+///   lens, multi-chain   W(v_0) prod |n_g . wi|_k / r_k^2           over the new x_1 .. x_j
+///   caustic             prod |n_g . wo|_k / r_(k+1)^2  prod J_k    over the new x_k, and the delta
+///                                                                  ones among them but for x_m.
+/// These keep the lobes of x, and so may be told apart by them.
+#pragma once
+
+#include <optional>
+
+#include "driftlight/phase_space.h"
+#include "driftlight/random.h"
+#include "vertex_path.h"
+
+namespace driftlight {
+
+/// What mutations may do.
+struct MutationLimits {
+  int min_edges = 1;
+  int max_edges = kMaxPathLength;
+  /// Sizes between which steps are drawn log-uniformly, in widths of the film.
+  double step_min = 0;
+  double step_max = 0;
+};
+
+/// Vertices that a bidirectional mutation keeps: x_0 .. x_(sensor-1), and the last `light`.
+struct KeptEnds {
+  int sensor = 1;
+  int light = 0;
+
+  /// Those that it deletes of a path of so many edges.
+  int deleted(int edges) const { return edges + 1 - sensor - light; }
+};
+
+/// log T(y | x) and log T(x | y), up to a common factor.
+struct MutationDensities {
+  double forward = 0;
+  double reverse = 0;
+};
+
+class PathMutation {
+ public:
+  PathMutation(const Scene& scene, const MutationLimits& limits);
+
+  /// Each draws y and evaluates it. Other than Ok: there is none, or it carries no light.
+  TraceStatus bidirectional(const VertexPath& x, VertexPath& y, MutationDensities& densities,
+                            Rng& rng) const;
+  /// The lens or multi-chain perturbation, one of which every path has.
+  TraceStatus from_sensor(const VertexPath& x, VertexPath& y, MutationDensities& densities,
+                          Rng& rng) const;
+  /// The caustic perturbation, of a path that has it.
+  TraceStatus caustic(const VertexPath& x, VertexPath& y, MutationDensities& densities,
+                      Rng& rng) const;
+  static bool has_caustic(const VertexPath& x);
+
+  // The parts of the bidirectional mutation.
+
+  /// p(a, b | n)
+  double probability(const KeptEnds& kept, int edges) const;
+  KeptEnds draw_kept(int edges, Rng& rng) const;
+  /// p(N | a, b, N_x), among those N that the limits allow.
+  double probability(int count, const KeptEnds& kept, int deleted) const;
+  int draw_count(const KeptEnds& kept, int deleted, Rng& rng) const;
+  /// Makes y of the ends of x and new vertices from both sides. Not evaluated.
+  TraceStatus regrow(const VertexPath& x, const KeptEnds& kept, int from_sensor, int from_light,
+                     VertexPath& y, Rng& rng) const;
+  /// log of the product above, of y that is evaluated; -infinity where i cannot make it.
+  static double log_way(const VertexPath& y, const KeptEnds& kept, int from_sensor);
+
+ private:
+  /// log T(y | x) for given ends, but for the factor p(a, b | n_x).
+  double log_regrowth(const VertexPath& y, const KeptEnds& kept, int deleted) const;
+  TraceStatus grow_from_sensor(VertexPath& y, int first, int count, bool hits, Rng& rng) const;
+  TraceStatus grow_from_light(VertexPath& y, int last, int count, Rng& rng) const;
+  /// The ray meets an emitter, which becomes the end of y.
+  TraceStatus end_by_hit(VertexPath& y, RayFollower ray) const;
+  /// The ray meets vertex k of y, which has the lobe of x there.
+  TraceStatus arrive_as(const VertexPath& x, int k, RayFollower& ray, VertexPath& y) const;
+  /// The ray goes on by the delta lobe of vertex k of y.
+  TraceStatus follow_delta(const VertexPath& y, int k, RayFollower& ray) const;
+  TraceStatus joined(const VertexPath& y, int k) const;
+  double draw_step(Rng& rng) const;
+  RayFollower moved_from_light(const VertexPath& x, int m, Rng& rng) const;
+
+  const Scene& scene_;
+  MutationLimits limits_;
+};
+
+}  // namespace driftlight

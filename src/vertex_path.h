@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+/// A path by its vertices, in the measure of area, for the mutations of path_mutation.h.
+///
+/// Of x_0 .. x_n, the sensor to the light, the density of f is taken per area of x_1 .. x_n, per
+/// solid angle of an x_n that is the direction of an environment, and by count of the one point of
+/// a delta emitter. Delta lobes are densities like any other, narrow ones, as in subpath.h: their
+/// infinite factors are alike in f and in each density that can make the path, and left out of
+/// both. With wi and wo toward the sensor and the light at each vertex,
+///   f = W(v_0) prod_(0 < k < n) { f_s |n_s . wo|_k  |n_g . wi|_k / r_k^2 }  L cos_n / r_n^2,
+/// r_k the length of the edge from x_(k-1); no cosine at a delta emitter, neither it nor r_n at
+/// infinity. The sensor is a pinhole. From the sensor and from the light x_k has the densities
+///   A_k = p_(k-1)(wo) |n_g . wi|_k / r_k^2,   B_k = p_(k+1)(wi) |n_g . wo|_k / r_(k+1)^2,
+/// p_0 = W(v_0), p_n that of emission, and B_n that of emitter sampling.
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "bidirectional_tracer.h"
+#include "driftlight/contribution.h"
+#include "driftlight/path_sampler.h"
+
+namespace driftlight {
+
+class VertexPath {
+ public:
+  /// x_k, 0 < k < n. Its directions are those to its neighbours, not `surface.wi`.
+  struct Vertex {
+    SurfaceHit surface{};
+    bool delta = false;                              ///< it scatters by a delta lobe
+    Scattering scattering = Scattering::Reflection;  ///< that of the delta lobe
+
+    /// As the lobe that it goes on by.
+    PathVertex lobe() const { return {surface.hit, delta, scattering}; }
+  };
+
+  int edges = 0;  ///< n
+  LightEnd end;   ///< x_n
+  Vertex& operator()(int k) { return vertices_[static_cast<std::size_t>(k - 1)]; }
+  const Vertex& operator()(int k) const { return vertices_[static_cast<std::size_t>(k - 1)]; }
+
+  /// Takes down all that follows from the vertices; to be called when they have changed. False if
+  /// the path carries no light. Whether its edges are free is not its concern.
+  bool evaluate(const Scene& scene);
+
+  /// The rest is of a path that carries light.
+
+  const Contribution& contribution() const { return contribution_; }
+  /// Unit direction from x_k to x_(k+1).
+  const Vec3d& toward_light(int k) const { return directions_[static_cast<std::size_t>(k)]; }
+  /// log A_k, 0 < k <= n; -infinity of an end that no ray can find.
+  double log_from_sensor(int k) const { return at(forward_, k - 1) + at(arriving_, k); }
+  /// log B_k, 0 < k <= n.
+  double log_from_light(int k) const {
+    return k == edges ? log_end_ : at(backward_, k + 1) + at(leaving_, k);
+  }
+  /// log of |n_g . wi|_k / r_k^2 and of |n_g . wo|_k / r_(k+1)^2
+  double log_arriving(int k) const { return at(arriving_, k); }
+  double log_leaving(int k) const { return at(leaving_, k); }
+  /// log J of the delta vertex k: its density toward the sensor, over P.
+  double log_spread(int k) const { return at(backward_, k) - at(forward_, k); }
+  /// log W(v_0)
+  double log_importance() const { return at(forward_, 0); }
+  /// Whether an edge from x_(k-1) to x_k may be a connection.
+  bool connects(int k) const {
+    return (k == 1 || !(*this)(k - 1).delta) && (k == edges || !(*this)(k).delta) && edges > 1;
+  }
+
+ private:
+  using Logs = std::array<double, kMaxPathLength + 1>;
+  static double at(const Logs& logs, int k) { return logs[static_cast<std::size_t>(k)]; }
+
+  std::array<Vertex, kMaxPathLength> vertices_;
+  Contribution contribution_;
+  std::array<Vec3d, kMaxPathLength> directions_;
+  Logs forward_{};   ///< log p_k(wo)
+  Logs backward_{};  ///< log p_k(wi)
+  Logs arriving_{};
+  Logs leaving_{};
+  double log_end_ = 0;
+};
+
+/// Throws InputError unless the scene's sensor is a pinhole.
+void require_pinhole(const Scene& scene, const std::string& integrator);
+
+/// The same paths by their vertices, not yet evaluated.
+VertexPath vertex_path(const Scene& scene, const PathSampler::Sample& sample);
+VertexPath vertex_path(const FoundPath& found);
+
+}  // namespace driftlight
