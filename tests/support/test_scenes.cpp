@@ -328,7 +328,7 @@ Scene coated(bool with_point) {
   return make->build();
 }
 
-Scene plan(bool with_glass) {
+Scene plan(bool with_caustics) {
   Workshop make;
   const auto plain = make.one_sided(Diffuse{gray(0.7)});
   add_walls(make, make.one_sided(Phong{textured(8, 0.2, 0.6), gray(0.3), 15}), plain, plain);
@@ -342,11 +342,12 @@ Scene plan(bool with_glass) {
                            boxed(RoughConductor{ggx(0.15), kGoldEta, kGoldK, gray(1.0)})}));
   make->add_shape(
       quad({0.9, 0.1, -1.2}, {0.9, 0, 0.4}, {0, 1.4, 0}, true, 0.1),
-      make.two_sided(Blend{weight, boxed(Plastic(kGlass, gray(0.5), gray(1.0), false)),
-                           boxed(Blend{gray(0.3), boxed(Phong{gray(0.3), gray(0.4), 20}),
-                                       boxed(Conductor{kGoldEta, kGoldK, gray(1.0)})})},
-                     Blend{weight, boxed(Diffuse{gray(0.7)}), boxed(Mask{gray(0.4), nullptr})}));
-  if (with_glass) {
+      make.two_sided(
+          Blend{weight, boxed(Plastic(kGlass, gray(0.5), gray(1.0), false)),
+                boxed(Blend{gray(0.3), boxed(Phong{gray(0.3), gray(0.4), 20}),
+                            boxed(Conductor{kGoldEta, kGoldK, gray(1.0)})})},
+          Blend{weight, boxed(Diffuse{gray(0.7)}), boxed(Conductor{kGoldEta, kGoldK, gray(1.0)})}));
+  if (with_caustics) {
     make->add_shape(
         round_mesh({0.6, 0.3, 1.2}, 0.3, 6),
         make.one_sided(Blend{weight, boxed(RoughDielectric{ggx(0.2), kGlass, gray(1.0), gray(1.0)}),
@@ -360,8 +361,10 @@ Scene plan(bool with_glass) {
   const auto black = make.one_sided(Diffuse{gray(0.0)});
   make->add_shape(quad({-0.6, 2.9, -0.6}, {1.2, 0, 0}, {0, 0, 1.2}), black, Rgbd{4, 4, 4});
   make->add_shape(round_mesh({-1.5, 1.6, -1.0}, 0.3, 4, false), black, Rgbd{3, 4, 5});
-  make->add_emitter(SpotEmitter({0.3, 3.2, 2.0}, {-0.1, -3.0, -1.8}, {40, 35, 30}, 0.6, 0.2));
-  make->add_emitter(DirectionalEmitter{Vec3d(0.5, -1.0, -0.8).normalized(), {0.4, 0.5, 0.6}});
+  if (with_caustics) {
+    make->add_emitter(SpotEmitter({0.3, 3.2, 2.0}, {-0.1, -3.0, -1.8}, {40, 35, 30}, 0.6, 0.2));
+    make->add_emitter(DirectionalEmitter{Vec3d(0.5, -1.0, -0.8).normalized(), {0.4, 0.5, 0.6}});
+  }
   Camera camera = look_at({0.8, 2.6, 3.6}, {0, 0.7, 0}, 0.5);
   camera.projection = Camera::Projection::Orthographic;
   camera.scale = 3.6;

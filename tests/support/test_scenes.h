@@ -29,9 +29,9 @@ struct TestScene {
 const std::vector<TestScene>& test_scenes();
 
 /// With films of 32 x 24 pixels; path tracing finds all light of the first without the point
-/// emitter, and of the second without glass.
+/// emitter, and of the second without glass and emitters that cannot be hit.
 Scene coated(bool with_point);
-Scene plan(bool with_glass);
+Scene plan(bool with_caustics);
 
 /// Paths that carry light, drawn from a scene by its PathSampler.
 std::vector<PathSampler::Sample> light_paths(const TestScene& scene, int count, std::uint64_t seed);
