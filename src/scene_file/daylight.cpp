@@ -119,10 +119,12 @@ void add_sun(const TexelGrid& grid, const SunPosition& sun, double radius, const
       const Vec3d middle = sun_direction({grid.zenith(y + 0.5), grid.azimuth(x + 0.5)});
       if (middle.dot(axis) < std::cos(std::min(kPi, radius + 2.0 * texel))) continue;
       int inside = 0;
-      for (int i = 0; i < samples * samples; ++i) {
-        const double u = x + (i % samples + 0.5) / samples;
-        const double v = y + (i / samples + 0.5) / samples;
-        if (sun_direction({grid.zenith(v), grid.azimuth(u)}).dot(axis) >= cosine) ++inside;
+      for (int j = 0; j < samples; ++j) {
+        const double zenith = grid.zenith(y + (j + 0.5) / samples);
+        for (int i = 0; i < samples; ++i) {
+          const double azimuth = grid.azimuth(x + (i + 0.5) / samples);
+          if (sun_direction({zenith, azimuth}).dot(axis) >= cosine) ++inside;
+        }
       }
       if (inside == 0) continue;
       const double share = static_cast<double>(inside) / (samples * samples);
@@ -224,11 +226,11 @@ double Daylight::value(const Component& component, double cosine, double gamma) 
 }
 
 Rgbd Daylight::sky(double zenith, double from_sun) const {
-  static const double kRadiance = 1000.0 / (683.0 * observer_width());  // of kcd / m^2
+  static const double radiance = 1000.0 / (683.0 * observer_width());  // of kcd / m^2
   const double cosine = std::max(std::cos(zenith), 1e-3);
   const double luminance = std::max(0.0, value(luminance_, cosine, from_sun));
   return xyy_to_srgb(value(x_, cosine, from_sun), value(y_, cosine, from_sun),
-                     kRadiance * luminance);
+                     radiance * luminance);
 }
 
 /// Appendix 1: the solar spectrum times the transmittances of scattering by molecules (Rayleigh)
