@@ -8,6 +8,7 @@
 #include <mutex>
 #include <vector>
 
+#include "chain_schedule.h"
 #include "direct_pass.h"
 #include "driftlight/error.h"
 #include "driftlight/film.h"
@@ -19,10 +20,6 @@
 
 namespace driftlight {
 namespace {
-
-/// Most chains that start from one path, and how much longer than usual they may become.
-constexpr double kMostChainsOfPath = 16;
-constexpr double kMostLengthening = 16;
 
 /// What all samples of a render share.
 struct Energy {
@@ -147,19 +144,10 @@ class EnergySampler {
     return false;
   }
 
-  /// Mutations that deposit e_d each; if they would be too many, longer chains, and if these are
-  /// too long, mutations that deposit more.
+  /// By chains of mutations that deposit e_d each.
   void redistribute(const Start& start, Rng& rng, LangevinStatistics& statistics) {
-    const double length = energy_.options.chain_length;
-    double deposit = energy_.deposit;
-    double mutations = length;
-    double chains = std::floor(start.value / (deposit * length) + rng.uniform());
-    if (chains > kMostChainsOfPath) {
-      mutations = std::ceil(
-          std::min(start.value / (deposit * kMostChainsOfPath), kMostLengthening * length));
-      chains = kMostChainsOfPath;
-      deposit = start.value / (mutations * chains);
-    }
+    const auto [chains, mutations, deposit] =
+        schedule_chains(start.value, energy_.deposit, energy_.options.chain_length, rng);
     if (chains > 0.0) ++statistics.starts;
     for (double i = 0; i < chains; ++i)
       run(start.path, static_cast<std::uint64_t>(mutations), deposit / energy_.unit, rng,

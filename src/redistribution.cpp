@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "chain_schedule.h"
 #include "driftlight/error.h"
 #include "driftlight/film.h"
 #include "exact_sum.h"
@@ -23,9 +24,6 @@
 namespace driftlight {
 namespace {
 
-/// Most chains that start from one sample, and how much longer than usual they may become.
-constexpr double kMostChains = 16;
-constexpr double kMostStretch = 16;
 /// Least deposit of a mutation, in units of the brightness of a pixel's sample: below it more
 /// mutations no longer pay.
 constexpr double kLeastDeposit = 0.2;
@@ -152,31 +150,22 @@ class RedistributionSampler {
     return start.share.tau / start.share.w;
   }
 
-  /// Chains of mutations that deposit epsilon each; if they would be too many, then longer ones,
-  /// and if these are too long, mutations that deposit more.
+  /// By chains of mutations that deposit epsilon each.
   void spread(const Start& start, Rng& rng) {
     common_.remainders.add(start.remainder);
     const double length = common_.options.redistribution.chain_length;
-    double deposit = common_.deposit;
-    double mutations = length;
-    double chains = std::floor(start.remainder / (deposit * length) + rng.uniform());
-    if (chains > kMostChains) {
-      mutations =
-          std::ceil(std::min(start.remainder / (deposit * kMostChains), kMostStretch * length));
-      chains = kMostChains;
-      deposit = start.remainder / (mutations * chains);
-    }
-    if (!(chains > 0.0)) return;
+    const ChainSchedule plan = schedule_chains(start.remainder, common_.deposit, length, rng);
+    if (!(plan.chains > 0.0)) return;
     std::optional<GradientProbe> probe =
-        common_.probed ? common_.probed->probe(start.contribution, chains * mutations)
+        common_.probed ? common_.probed->probe(start.contribution, plan.chains * plan.mutations)
                        : std::nullopt;
     chain_.observe(probe ? &*probe : nullptr);
     chain_.start_at(start.topology, start.coordinates, start.contribution, start.share);
-    for (double i = 0; i < chains; ++i)
-      chain_.run(static_cast<std::uint64_t>(mutations), rng,
+    for (double i = 0; i < plan.chains; ++i)
+      chain_.run(static_cast<std::uint64_t>(plan.mutations), rng,
                  [&](const Share& share, const Rgbd& color, double weight) {
                    common_.film.splat(share.film, color,
-                                      weight * deposit * share.brightness / common_.unit);
+                                      weight * plan.deposit * share.brightness / common_.unit);
                  });
     common_.count(chain_.take_statistics());
     if (probe) common_.probed->take(*probe);
