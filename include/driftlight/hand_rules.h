@@ -44,9 +44,8 @@
 ///   sphere           dn = dx' / R                                                        (H16)
 /// Ends:
 ///   camera           log W = -3 log(forward.v):  -3 forward / forward.v . dv             (H17)
-///   orthographic     dx of Camera::origin_differential, and no dv of the ray; a connection to it
-///   has
-///                    dw = 0 and the constant W / spread                                  (H33)
+///   orthographic     dx of Camera::origin_differential, and no dv of the ray; a connection
+///                    to it has dw = 0 and the constant W / spread                        (H33)
 ///   connection       w = e / r, e = y - x:  dw = (I - w w^T) de / r, d log r^2 = 2 w.de / r
 ///                    log cos_y, cos_y = -n_y.w:  d = -(n_y.dw + w.dn_y) / cos_y          (H18)
 ///   spot             log falloff(-w):  -(d falloff / dv)(-w) / falloff . dw              (H23)

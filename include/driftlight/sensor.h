@@ -29,9 +29,8 @@ struct Camera {
   double half_width = 1;   ///< of the image plane; of a pinhole tan(fov_x / 2)
   double half_height = 1;
   double scale = 1;  ///< Orthographic: length in the world of a unit of the image plane
-  Vec2d center{
-      0,
-      0};  ///< of the image plane's window, along right and up: films that are cropped or shifted
+  /// Of the image plane's window, along right and up: films that are cropped or shifted.
+  Vec2d center{0, 0};
   int film_width = 256;  ///< pixels
   int film_height = 256;
   ReconstructionFilter filter;
