@@ -8,21 +8,18 @@
 #include "driftlight/constraints.h"
 #include "driftlight/gradient.h"
 #include "driftlight/linearization.h"
+#include "nested_jets.h"
 
 namespace driftlight {
 namespace {
 
-/// Coordinates of a block: narrow Jets of Jets compile quickly and fit into registers.
-constexpr int kWidth = 4;
-
-using Inner = ceres::Jet<double, kWidth>;
-using Outer = ceres::Jet<Inner, kWidth>;
+constexpr int kWidth = kNestedWidth;
+using Inner = InnerJet;
+using Outer = NestedJet;
 using InnerPart = Eigen::Matrix<double, kWidth, 1>;
 using BlockMatrix = Eigen::Matrix<double, kWidth, kWidth>;
 /// All coordinates, with zeros up to a whole number of blocks.
 using Padded = Eigen::Matrix<double, kMaxDimension, 1>;
-
-static_assert(kMaxDimension % kWidth == 0);
 
 /// A residual's part in the sum.
 struct Term {
@@ -34,20 +31,13 @@ struct Term {
   double precision_slope = 0;  ///< dw.y
 };
 
-/// Coordinate j as a Jet of Jets: outer derivatives from `outer` on, inner ones from `inner` on.
-Outer seeded(int j, int outer, int inner) {
-  Outer x(Inner(0.0));
-  if (j >= inner && j < inner + kWidth) x.a.v[j - inner] = 1.0;
-  if (j >= outer && j < outer + kWidth) x.v[j - outer] = Inner(1.0);
-  return x;
-}
-
 /// Walks the path with the constraint visitor over Jets of Jets.
 template <class Sink>
 void walk_block(const Scene& scene, const PathTopology& topology, const Chart& chart, int outer,
                 int inner, Sink& sink) {
   const auto blocks = [&](int k) {
-    return chart.retract(k, seeded(2 * k, outer, inner), seeded(2 * k + 1, outer, inner));
+    return chart.retract(k, nested_jet(0.0, 2 * k, outer, inner),
+                         nested_jet(0.0, 2 * k + 1, outer, inner));
   };
   ConstraintVisitor<Outer, Sink> visitor(sink);
   walk<Outer>(scene, topology, blocks, visitor);

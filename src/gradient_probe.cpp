@@ -23,8 +23,10 @@ GradientProbe::GradientProbe(const Scene& scene, const KernelOptions& options, s
       first_index_(chain * kMostChecks),
       wait_(static_cast<double>(skip)) {
   selection_.gradient = options.drift != Drift::None;
-  selection_.constraints = options.preconditioner == PreconditionerKind::Constraints;
-  selection_.divergence = selection_.constraints && options.drift == Drift::Full;
+  const PreconditionerKind kind = options.preconditioner;
+  selection_.constraints =
+      kind == PreconditionerKind::Constraints || kind == PreconditionerKind::Diagonal;
+  selection_.divergence = kind == PreconditionerKind::Constraints && options.drift == Drift::Full;
   selection_.hand = options.derivatives == DerivativeMethod::Hand;
   const DerivativeMethod method = options.derivatives;
   functions_.divergence = [method](const Scene& s, const PathTopology& t, const Chart& c) {

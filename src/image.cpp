@@ -14,6 +14,7 @@
 
 #include "driftlight/error.h"
 #include "driftlight/scalar.h"
+#include "driftlight/tone_mapping.h"
 #include "pending_file.h"
 
 namespace driftlight {
@@ -23,13 +24,6 @@ namespace {
 /// IEC 61966-2-1: encoded value -> linear light.
 float from_srgb(float x) {
   return x <= 0.04045F ? x / 12.92F : std::pow((x + 0.055F) / 1.055F, 2.4F);
-}
-
-/// Linear light -> the nearest of 256 encoded values. NaN becomes 0.
-std::uint8_t to_srgb8(float x) {
-  const float y = x <= 0.0031308F ? 12.92F * x : 1.055F * std::pow(x, 1.0F / 2.4F) - 0.055F;
-  return y > 0.0F ? static_cast<std::uint8_t>(std::lround(std::min(y, 1.0F) * 255.0F))
-                  : std::uint8_t{0};
 }
 
 std::string lower_extension(const std::filesystem::path& file) {
@@ -96,15 +90,16 @@ void write_oiio(const PendingFile& file, OIIO::ImageSpec spec, const void* value
 }
 
 void write_oiio(const PendingFile& file, const Image& image,
-                const std::map<std::string, std::string>& metadata) {
+                const std::map<std::string, std::string>& metadata, const ToneMapping& tones) {
   const bool floats = stores_floats(file.target());
   OIIO::ImageSpec spec(image.width, image.height, 3,
                        floats ? OIIO::TypeDesc::FLOAT : OIIO::TypeDesc::UINT8);
-  spec.attribute("oiio:ColorSpace", floats ? "Linear" : "sRGB");
+  if (floats || !tones.gamma)
+    spec.attribute("oiio:ColorSpace", floats ? "Linear" : "sRGB");
+  else
+    spec.attribute("oiio:Gamma", static_cast<float>(*tones.gamma));
   if (floats) return write_oiio(file, spec, image.rgb.data(), metadata);
-  std::vector<std::uint8_t> bytes(image.rgb.size());
-  std::transform(image.rgb.begin(), image.rgb.end(), bytes.begin(), to_srgb8);
-  write_oiio(file, spec, bytes.data(), metadata);
+  write_oiio(file, spec, tone_map(image, tones).data(), metadata);
 }
 
 }  // namespace
@@ -143,11 +138,16 @@ Image read_image(const std::filesystem::path& file) {
 
 void write_image(const std::filesystem::path& file, const Image& image,
                  const std::map<std::string, std::string>& metadata) {
+  write_image(file, image, metadata, ToneMapping{});
+}
+
+void write_image(const std::filesystem::path& file, const Image& image,
+                 const std::map<std::string, std::string>& metadata, const ToneMapping& tones) {
   PendingFile pending(file);
   if (is_pfm(file))
     write_pfm(pending, image);
   else
-    write_oiio(pending, image, metadata);
+    write_oiio(pending, image, metadata, tones);
   pending.commit();
 }
 

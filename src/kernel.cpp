@@ -21,16 +21,23 @@ StepDistribution::StepDistribution(const KernelOptions& options, int dimension,
   set(options, dimension, gradient, divergence_of_inverse);
 }
 
+FactorStatus StepDistribution::factorise_step(const Linearization& path, const Matrix* precision) {
+  if (precision == nullptr)
+    return path.stage_count > 0 ? factorise(path, factor_) : FactorStatus::Indefinite;
+  if (!precision->allFinite()) return FactorStatus::NonFinite;
+  const auto cholesky = CholeskyFactor::of(*precision);
+  if (!cholesky) return FactorStatus::Indefinite;
+  factor_ = *cholesky;
+  return FactorStatus::Ok;
+}
+
 bool StepDistribution::assign(const KernelOptions& options, const Linearization& path,
-                              const Vector* divergence_of_inverse) {
+                              const Matrix* precision, const Vector* divergence_of_inverse) {
   if (!path.gradient.allFinite()) return false;
   const int dimension = 2 * path.block_count;
-  bool identity = path.stage_count == 0;
-  if (!identity) {
-    const FactorStatus status = factorise(path, factor_);
-    if (status == FactorStatus::NonFinite) return false;
-    identity = status == FactorStatus::Indefinite;
-  }
+  const FactorStatus status = factorise_step(path, precision);
+  if (status == FactorStatus::NonFinite) return false;
+  const bool identity = status == FactorStatus::Indefinite;
   if (identity) factor_ = IdentityFactor(dimension);
   const bool has_gradient = path.gradient.size() > 0;
   set(options, dimension, has_gradient ? &path.gradient : nullptr,

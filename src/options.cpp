@@ -120,7 +120,8 @@ void check(const std::vector<OptionEntry>& entries) {
 
 std::vector<OptionEntry> entries(LangevinOptions& options) {
   constexpr std::array<std::string_view, 3> kDrifts{"none", "gradient", "full"};
-  constexpr std::array<std::string_view, 2> kPreconditioners{"identity", "constraints"};
+  constexpr std::array<std::string_view, 4> kPreconditioners{"identity", "diagonal", "constraints",
+                                                             "hessian"};
   constexpr std::array<std::string_view, 2> kMethods{"jet", "hand"};
   const Range<double> positive{.low = 0, .open = true};
   KernelOptions& kernel = options.kernel;
@@ -137,7 +138,8 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
       choice("drift", kernel.drift, kDrifts,
              "drift of a small step: Brownian, -T T* grad U, or that + div(T T*)"),
       choice("preconditioner", kernel.preconditioner, kPreconditioners,
-             "step matrix: the same in all directions, or from the path's constraints"),
+             "step matrix: the same in all directions, from the diagonal or the whole matrix of "
+             "the path's constraints, or from second derivatives of the contribution"),
       choice("derivatives", kernel.derivatives, kMethods,
              "automatic or hand-derived derivatives; the same to rounding"),
       choice("aperture", kernel.aperture, std::array<std::string_view, 2>{"off", "on"},

@@ -49,13 +49,25 @@ std::vector<double> tile_luminances(const Image& image) {
   return means;
 }
 
-Spread spread(const Image& a, const Image& b) {
+Spread spread(const Image& a, const Image& b, const Image& expected) {
   assert(a.width == b.width && a.height == b.height);
-  // (a - M)^2 is half of half the squared difference.
-  Image middle = a;
-  for (std::size_t i = 0; i < a.rgb.size(); ++i) middle.rgb[i] = 0.5F * (a.rgb[i] + b.rgb[i]);
-  const Difference d = difference(a, middle);
-  return {.mse = 2.0 * d.mse, .relmse = 2.0 * d.relmse, .relmse_trimmed = 2.0 * d.relmse_trimmed};
+  // An image that is off by as much as the two are from each other.
+  Image off = expected;
+  for (std::size_t i = 0; i < a.rgb.size(); ++i) off.rgb[i] += a.rgb[i] - b.rgb[i];
+  const Difference d = difference(off, expected);
+  return {.mse = 0.5 * d.mse, .relmse = 0.5 * d.relmse, .relmse_trimmed = 0.5 * d.relmse_trimmed};
+}
+
+Image median_image(const std::vector<const Image*>& images) {
+  Image result(images.front()->width, images.front()->height);
+  std::vector<float> values(images.size());
+  for (std::size_t i = 0; i < result.rgb.size(); ++i) {
+    for (std::size_t k = 0; k < images.size(); ++k) values[k] = images[k]->rgb[i];
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    result.rgb[i] = *middle;
+  }
+  return result;
 }
 
 TileTest test_tiles(const std::vector<Moments>& tiles, const std::vector<double>& reference) {

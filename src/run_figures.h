@@ -13,9 +13,10 @@ namespace driftlight {
 /// lower edge may be smaller.
 std::vector<double> tile_luminances(const Image& image);
 
-/// The squared error of one image, as two independent ones a and b show it without a reference:
-/// half of (a - b)^2 has its variance for mean. Figures as those of `Difference`, relMSE relative
-/// to the mean M of both: mean of (a - b)^2 / 2 / (M^2 + 0.01).
+/// The squared error of one image, as two independent ones a and b show it: half of (a - b)^2 has
+/// its variance for mean. Figures as those of `Difference`, relMSE relative to an image M of what
+/// is expected: mean of (a - b)^2 / 2 / (M^2 + 0.01). With the mean of a and b for M no pixel could
+/// be off by more than 2, however heavy.
 struct Spread {
   double mse = 0;
   double relmse = 0;
@@ -23,7 +24,11 @@ struct Spread {
 };
 
 /// Of images of the same size.
-Spread spread(const Image& a, const Image& b);
+Spread spread(const Image& a, const Image& b, const Image& expected);
+
+/// The median of each value over all images, of the same size: what is expected where there is no
+/// reference, as single heavy samples do not move it. Of at least one image.
+Image median_image(const std::vector<const Image*>& images);
 
 /// Student's test of each tile that the mean over runs is the reference's.
 struct TileTest {

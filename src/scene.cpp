@@ -411,8 +411,15 @@ std::uint32_t SceneBuilder::add_shape(Geometry geometry, std::uint32_t material,
           "an emitting cylinder must not be more than 10000 times as long as its "
           "radius, nor the reverse");
   }
+  const std::shared_ptr<const Relief>& relief = scene_.surfaces_->materials.at(material).relief;
+  if (relief != nullptr) {
+    const auto* mesh = std::get_if<TriangleMesh>(&geometry);
+    if (mesh == nullptr || mesh->uvs.empty())
+      throw InputError("bump and normal maps need a mesh with texture coordinates");
+  }
   const auto index = static_cast<std::uint32_t>(scene_.surfaces_->shapes.size());
   Shape shape;
+  shape.relief = relief;
   shape.geometry = std::move(geometry);
   shape.material = material;
   if (radiance) {
@@ -444,7 +451,8 @@ Scene SceneBuilder::build() {
   for (Shape& shape : scene.surfaces_->shapes) {
     shape.extent = extent_of(shape.geometry);
     const Material& material = scene.surfaces_->materials.at(shape.material);
-    shape.textured = is_textured(scene.surfaces_->bsdfs.at(material.front)) ||
+    shape.textured = shape.relief != nullptr ||
+                     is_textured(scene.surfaces_->bsdfs.at(material.front)) ||
                      (material.back && is_textured(scene.surfaces_->bsdfs.at(*material.back)));
     if (shape.emitter)
       if (const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry))

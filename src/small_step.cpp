@@ -6,6 +6,7 @@
 
 #include "driftlight/aperture.h"
 #include "driftlight/divergence.h"
+#include "driftlight/precision.h"
 
 namespace driftlight {
 namespace {
@@ -51,9 +52,10 @@ double log_refused(double log_pdf, double log_first_acceptance) {
 }
 
 void prepare_step(const Scene& scene, const KernelOptions& options, ChainState& state) {
-  const DerivativeRequest request{
-      .gradient = options.drift != Drift::None,
-      .constraints = options.preconditioner == PreconditionerKind::Constraints};
+  using enum PreconditionerKind;
+  const PreconditionerKind kind = options.preconditioner;
+  const DerivativeRequest request{.gradient = options.drift != Drift::None,
+                                  .constraints = kind == Constraints || kind == Diagonal};
   state.chart = Chart(scene, state.topology, state.coordinates);
   state.has_step = true;
   state.figures.reset();
@@ -64,12 +66,20 @@ void prepare_step(const Scene& scene, const KernelOptions& options, ChainState& 
     apertures = find_apertures(scene, state.topology, state.coordinates);
     constrain(scene, state.topology, state.chart, apertures, path);
   }
+  std::optional<Matrix> precision;
+  if (kind == Diagonal) precision = diagonal_precision(path);
+  if (kind == Hessian)
+    precision = hessian_precision(scene, state.topology, state.chart,
+                                  Vector::Zero(state.chart.dimension()));
   std::optional<Vector> div;
-  if (options.drift == Drift::Full && request.constraints) {
-    div = divergence(scene, state.topology, state.chart, options.derivatives, apertures);
+  if (options.drift == Drift::Full && kind != Identity) {
+    div = kind == Constraints
+              ? divergence(scene, state.topology, state.chart, options.derivatives, apertures)
+              : dense_divergence(scene, state.topology, state.chart, kind);
     if (!div->allFinite()) div.reset();
   }
-  state.finite = state.step.assign(options, path, div ? &*div : nullptr);
+  state.finite =
+      state.step.assign(options, path, precision ? &*precision : nullptr, div ? &*div : nullptr);
 }
 
 void SmallStep::prepare(ChainState& state) {

@@ -14,18 +14,15 @@ Rgbd Texture::steps(const Vec2d& uv) const {
   return scale * wrapped_texel(*bitmap, x, y);
 }
 
-Texture::Slopes Texture::slopes(const Vec2d& uv) const {
-  if (bitmap == nullptr || pattern || !interpolates) return {Rgbd::Zero(), Rgbd::Zero()};
-  const double width = bitmap->width;
-  const double height = bitmap->height;
-  const Vec2d p = place(uv);
-  const double x = p.x() * width;
-  const double y = p.y() * height;
-  const BilinearPatch patch(*bitmap, x, y, wrap_u, wrap_v);
-  const Rgbd slope_x = scale * patch.slope_x(y) * width;
-  const Rgbd slope_y = scale * patch.slope_y(x) * height;
-  const Eigen::Matrix2d& m = uv_to_texture;
-  return {slope_x * m(0, 0) + slope_y * m(1, 0), slope_x * m(0, 1) + slope_y * m(1, 1)};
+// With texel coordinates (x, y) = A uv + b and H = d^2 c / dx dy of the patch:
+//   c_uu = 2 A_xu A_yu H,  c_uv = (A_xu A_yv + A_xv A_yu) H,  c_vv = 2 A_xv A_yv H
+Texture::Curvatures Texture::curvatures(const Vec2d& uv) const {
+  if (!is_smooth()) return {Rgbd::Zero(), Rgbd::Zero(), Rgbd::Zero()};
+  const Vec2d p = texel_place(uv);
+  const Rgbd mixed = scale * BilinearPatch(*bitmap, p.x(), p.y(), wrap_u, wrap_v).mixed();
+  const Eigen::Matrix2d a = uv_to_texels();
+  return {2.0 * a(0, 0) * a(1, 0) * mixed, (a(0, 0) * a(1, 1) + a(0, 1) * a(1, 0)) * mixed,
+          2.0 * a(0, 1) * a(1, 1) * mixed};
 }
 
 Rgbd Texture::maximum_color() const {

@@ -194,11 +194,17 @@ TEST(Constraints, JacobiansEqualRiddersDifferences) {
         while (residuals(step).size() != count || residuals(-step).size() != count) step *= 0.25;
         for (std::size_t i = 0; i < count; ++i) {
           const auto f = [&](double x) { return residuals(x).at(i); };
-          const Derivative expected = ridders(f, step);
           // In units of the residual's sigma per width of the coordinate.
           const double sigma = 1.0 / std::sqrt(std::max(rows.precisions[i], 1e-6));
-          EXPECT_NEAR(rows.residuals[i].v[j], expected.value,
-                      10.0 * expected.error + 1e-7 * sigma / width)
+          const auto tolerance = [&](const Derivative& x) {
+            return 10.0 * x.error + 1e-7 * sigma / width;
+          };
+          const double jet = rows.residuals[i].v[j];
+          Derivative expected = ridders(f, step);
+          // Within the step there may be a seam of a bump map, where normals jump.
+          if (std::abs(jet - expected.value) > tolerance(expected))
+            expected = ridders(f, 0.01 * step);
+          EXPECT_NEAR(jet, expected.value, tolerance(expected))
               << test.name << " residual " << i << " coordinate " << j;
         }
       }

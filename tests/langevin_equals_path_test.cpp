@@ -44,7 +44,7 @@ const std::map<std::string, Work>& works() {
   return kWorks;
 }
 
-/// A way to sample. All use the constraint matrix.
+/// A way to sample.
 struct Way {
   Mode mode = Mode::Chain;
   Drift drift = Drift::Gradient;
@@ -55,6 +55,7 @@ struct Way {
   bool aperture = false;
   SplittingOptions splitting = {};
   bool delayed_rejection = false;
+  PreconditionerKind preconditioner = PreconditionerKind::Constraints;
 };
 
 const std::map<std::string, Way>& ways() {
@@ -66,6 +67,8 @@ const std::map<std::string, Way>& ways() {
       {"chains_alone", {.drift = Drift::None, .direct = DirectLight::Chain}},
       {"aperture", {.aperture = true}},
       {"delayed", {.phase_space = PhaseSpace::Bidirectional, .delayed_rejection = true}},
+      {"diagonal", {.drift = Drift::Full, .preconditioner = PreconditionerKind::Diagonal}},
+      {"hessian", {.preconditioner = PreconditionerKind::Hessian}},
       {"both_ends", {.phase_space = PhaseSpace::Bidirectional}},
       {"redistribution", {.mode = Mode::Redistribution}},
       {"short_chains",
@@ -140,6 +143,7 @@ TEST_P(LangevinEqualsPath, TileMeans) {
   options.mode = way.mode;
   options.kernel.drift = way.drift;
   options.kernel.aperture = way.aperture;
+  options.kernel.preconditioner = way.preconditioner;
   options.large_step_probability = work.large_step_probability;
   options.large_steps = way.large_steps;
   options.direct = way.direct;
@@ -177,6 +181,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"limelight", "redistribution_both_ends"}, Case{"sun_pane", "splitting"},
                     Case{"sun_pane", "high_threshold"}, Case{"glass_caustic", "splitting"},
                     Case{"lamp_in_glass", "two_levels"}, Case{"coated", "gradient"},
+                    Case{"ring_caustic", "hessian"}, Case{"limelight", "diagonal"},
                     Case{"coated", "redistribution_both_ends"}, Case{"plan", "gradient"},
                     Case{"plan", "both_ends"}),
     name_of);

@@ -112,7 +112,7 @@ INSTANTIATE_TEST_SUITE_P(
     Options, BadOption,
     ::testing::Values(
         BadValue{"drift", "sideways"}, BadValue{"drift", ""}, BadValue{"drift", "Full"},
-        BadValue{"preconditioner", "hessian"}, BadValue{"aperture", "1"}, BadValue{"epsilon", "0"},
+        BadValue{"preconditioner", "newton"}, BadValue{"aperture", "1"}, BadValue{"epsilon", "0"},
         BadValue{"epsilon", "-1"}, BadValue{"epsilon", "nan"}, BadValue{"epsilon", "inf"},
         BadValue{"epsilon", "0.1x"}, BadValue{"epsilon", " 0.1"}, BadValue{"epsilon", ""},
         BadValue{"epsilon", "1e999"}, BadValue{"safety", "0"}, BadValue{"time_step_cap", "0"},

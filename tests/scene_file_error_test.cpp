@@ -223,6 +223,29 @@ const Fault kPluginFaults[] = {
      R"(<bsdf type="mixturebsdf">@<string name="weights" value="0.3"/>)"
      R"(<bsdf type="phong"/><bsdf type="diffuse"/></bsdf>)",
      {"1 weights for 2 nested"}},
+    {"BumpMapWithoutTexture",
+     R"(@<bsdf type="bumpmap"><bsdf type="diffuse"/></bsdf>)",
+     {"needs a texture"}},
+    {"NormalMapOfTwo",
+     R"(<bsdf type="normalmap"><texture type="checkerboard"/><bsdf type="diffuse"/>)"
+     R"(@<bsdf type="diffuse"/></bsdf>)",
+     {"a second nested bsdf"}},
+    {"BumpMapOfANormalMap",
+     R"(@<bsdf type="bumpmap"><texture type="checkerboard"/><bsdf type="normalmap">)"
+     R"(<texture type="checkerboard"/><bsdf type="diffuse"/></bsdf></bsdf>)",
+     {"cannot be nested in each other"}},
+    {"BlendOfABumpMap",
+     R"(@<bsdf type="blendbsdf"><float name="weight" value="0.5"/><bsdf type="bumpmap">)"
+     R"(<texture type="checkerboard"/><bsdf type="diffuse"/></bsdf><bsdf type="diffuse"/></bsdf>)",
+     {"cannot be blended"}},
+    {"BumpMapOnOneSide",
+     R"(<bsdf type="twosided"><bsdf type="bumpmap">)"
+     R"(<texture type="checkerboard"/><bsdf type="diffuse"/></bsdf>@<bsdf type="diffuse"/></bsdf>)",
+     {"cannot differ by side"}},
+    {"BumpMapOnASphere",
+     R"(@<shape type="sphere"><bsdf type="bumpmap"><texture type="checkerboard"/>)"
+     R"(<bsdf type="diffuse"/></bsdf></shape>)",
+     {"need a mesh with texture coordinates"}},
     {"SunBelowTheHorizon",
      R"(@<emitter type="sky"><vector name="sunDirection" x="1" y="-0.1" z="0"/></emitter>)",
      {"below the horizon"}},

@@ -230,6 +230,50 @@ TEST(BsdfsXml, MixturesAreWeightedSums) {
   EXPECT_NEAR(value(mixture), expected, 1e-6 * expected);
 }
 
+/// The material of the only shape, a rectangle.
+Material load_material(const std::string& bsdf) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(lit("<shape type=\"rectangle\">" + bsdf + "</shape>"));
+  EXPECT_EQ(loaded.scene.materials().size(), 1U);
+  return loaded.scene.materials()[0];
+}
+
+TEST(BsdfsXml, ReadsBumpMaps) {
+  const Material material = load_material(
+      R"(<bsdf type="bumpmap"><float name="scale" value="-3"/><texture type="scale">
+         <float name="scale" value="0.2"/><texture type="checkerboard"/></texture>
+         <bsdf type="diffuse"/></bsdf>)");
+  ASSERT_NE(material.relief, nullptr);
+  EXPECT_EQ(material.relief->kind, Relief::Kind::Bumps);
+  EXPECT_EQ(material.relief->scale, -3.0);
+  expect_near(material.relief->texture.scale, Rgbd(0.2, 0.2, 0.2));
+}
+
+// Law: a map goes through what is around it; both sides share it.
+TEST(BsdfsXml, MapsMayBeNested) {
+  const std::string map =
+      R"(<bsdf type="normalmap"><texture name="normalmap" type="checkerboard"/>
+         <bsdf type="diffuse"/></bsdf>)";
+  const Material twosided = load_material(R"(<bsdf type="twosided">)" + map + "</bsdf>");
+  ASSERT_NE(twosided.relief, nullptr);
+  EXPECT_EQ(twosided.relief->kind, Relief::Kind::Normals);
+  EXPECT_TRUE(twosided.back.has_value());
+  EXPECT_NE(load_material(R"(<bsdf type="mask">)" + map + "</bsdf>").relief, nullptr);
+}
+
+// Law: a <ref> in a map may name its texture or its bsdf, in any order.
+TEST(BsdfsXml, MapsReferToTexturesAndBsdfs) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(lit(
+      R"(<texture type="gridtexture" id="grid"/><bsdf type="conductor" id="metal"/>
+         <shape type="rectangle"><bsdf type="bumpmap"><ref id="metal"/><ref id="grid"/></bsdf>
+         </shape><shape type="rectangle"><ref id="metal"/></shape>)"));
+  ASSERT_EQ(loaded.scene.materials().size(), 2U);
+  ASSERT_NE(loaded.scene.materials()[0].relief, nullptr);
+  EXPECT_TRUE(loaded.scene.materials()[0].relief->texture.pattern.has_value());
+  EXPECT_EQ(loaded.scene.materials()[1].relief, nullptr);
+}
+
 TEST(BsdfsXml, ShapesShareReferredMaterials) {
   const SceneDirectory directory;
   const LoadedScene loaded = directory.load(lit(

@@ -74,6 +74,24 @@ TEST(Texture, SlopesAreItsDerivatives) {
   EXPECT_GT(compared, 3000);
 }
 
+// Law: curvatures are the derivatives of the slopes, by Jets.
+TEST(Texture, CurvaturesAreTheDerivativesOfItsSlopes) {
+  using J = ceres::Jet<double, 2>;
+  Rng rng(143, Stream::Test, 0);
+  const Texture texture = mapped(Wrap::Repeat, Wrap::Mirror);
+  for (int i = 0; i < 200; ++i) {
+    const Vec2d uv(4.0 * rng.uniform() - 2.0, 4.0 * rng.uniform() - 2.0);
+    const auto slopes = texture.slopes(Vec2<J>(J(uv.x(), 0), J(uv.y(), 1)));
+    const Texture::Curvatures curvatures = texture.curvatures(uv);
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(slopes.u[c].v[0], curvatures.uu[c], 1e-12);
+      EXPECT_NEAR(slopes.u[c].v[1], curvatures.uv[c], 1e-12);
+      EXPECT_NEAR(slopes.v[c].v[0], curvatures.uv[c], 1e-12);
+      EXPECT_NEAR(slopes.v[c].v[1], curvatures.vv[c], 1e-12);
+    }
+  }
+}
+
 // Law: beyond its edges a bitmap is what its mode says.
 TEST(Texture, WrapsAtItsEdges) {
   const auto bitmap = pattern_bitmap(4, 4, 0.2, 0.9);
@@ -118,7 +136,7 @@ TEST(Texture, NearestTexelsAreSquares) {
   for (const double u : {0.251, 0.3, 0.499}) {
     const Rgbd expected = texture.bitmap->at(1, 2).cast<double>();
     EXPECT_EQ((eval(texture, {u, 0.6}) - expected).matrix().norm(), 0.0);
-    EXPECT_EQ(texture.slopes({u, 0.6}).u.matrix().norm(), 0.0);
+    EXPECT_EQ(texture.slopes(Vec2d(u, 0.6)).u.matrix().norm(), 0.0);
   }
 }
 

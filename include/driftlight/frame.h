@@ -25,6 +25,12 @@ requires(ScalarTraits<T>::is_jet) T dot(const Vec3d& a, const Vec3<T>& b) {
   return a.x() * b.x() + a.y() * b.y() + a.z() * b.z();
 }
 
+template <Scalar T>
+Vec3<T> cross(const Vec3<T>& a, const Vec3<T>& b) {
+  return {a.y() * b.z() - a.z() * b.y(), a.z() * b.x() - a.x() * b.z(),
+          a.x() * b.y() - a.y() * b.x()};
+}
+
 /// p + v t
 template <Scalar T>
 Vec3<T> along(const Vec3<T>& p, const T& t, const Vec3<T>& v) {

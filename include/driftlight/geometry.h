@@ -100,6 +100,21 @@ inline Vec3d geometric_normal(const TriangleMesh& mesh, std::uint32_t triangle) 
   return n.dot(shading) < 0.0 ? Vec3d(-n) : n;
 }
 
+/// Unit shading normal of a triangle at a point of its plane.
+inline Vec3d shading_normal(const TriangleMesh& mesh, std::uint32_t triangle, const Vec3d& p) {
+  if (mesh.normals.empty()) return geometric_normal(mesh, triangle);
+  const std::array<Vec3d, 3> corner = corners(mesh, triangle);
+  const Vec3d n = (corner[1] - corner[0]).cross(corner[2] - corner[0]);
+  const Vec3d step = (p - corner[0]) / n.squaredNorm();
+  const double b1 = n.dot(step.cross(corner[2] - corner[0]));
+  const double b2 = n.dot((corner[1] - corner[0]).cross(step));
+  const auto& index = mesh.triangles[triangle];
+  const auto normal = [&](int i) -> Vec3d {
+    return mesh.normals[index[static_cast<std::size_t>(i)]].cast<double>();
+  };
+  return ((1.0 - b1 - b2) * normal(0) + b1 * normal(1) + b2 * normal(2)).normalized();
+}
+
 namespace detail {
 
 /// t = n.(p0 - o) / n.d meets the triangle's plane; barycentric b1, b2 by Cramer's rule:

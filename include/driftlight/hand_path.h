@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "driftlight/hand_rules.h"
+#include "driftlight/hand_relief.h"
 #include "driftlight/linearization.h"
 #include "driftlight/walk.h"
 
@@ -154,12 +154,18 @@ struct Recorder : WalkVisitor<double> {
     }
     x.scattering = e.scattering;
     x.delta = is_delta;
-    x.surface = std::visit(
-        [&](const auto& shape) {
-          return Rules::surface(shape, primitive, x.p, x.n_s, e.shape.textured);
-        },
-        e.shape.geometry);
+    x.surface = differential(x, primitive);
     return x;
+  }
+  static SurfaceDifferential differential(const Vertex& x, std::uint32_t primitive) {
+    if (const Relief* const relief = x.shape->relief.get())
+      return relieved_surface<Rules>(*relief, std::get<TriangleMesh>(x.shape->geometry), primitive,
+                                     x.p, x.uv, x.n_s);
+    return std::visit(
+        [&](const auto& shape) {
+          return Rules::surface(shape, primitive, x.p, x.n_s, x.shape->textured);
+        },
+        x.shape->geometry);
   }
 
   int index_ = 0;

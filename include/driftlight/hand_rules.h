@@ -42,6 +42,7 @@
 ///   dx' = (I - v n^T / n.v) (dx + t dv)                                                  (H14)
 ///   interpolated n = N / |N|, N = n_0 + b_1 e_1 + b_2 e_2:  dn = (I - n n^T) dN / |N|    (H15)
 ///   sphere           dn = dx' / R                                                        (H16)
+///   relief           (H35), (H36) of hand_relief.h
 /// Ends:
 ///   camera           log W = -3 log(forward.v):  -3 forward / forward.v . dv             (H17)
 ///   orthographic     dx of Camera::origin_differential, and no dv of the ray; a connection

@@ -10,6 +10,8 @@
 
 namespace driftlight {
 
+struct ToneMapping;
+
 /// Rows from the top, three channels a pixel.
 struct Image {
   int width = 0;
@@ -38,11 +40,13 @@ double mean_luminance(const Image& image);
 Image read_image(const std::filesystem::path& file);
 
 /// Writes an image in the format of the file's ending: floats for .exr, .pfm and .hdr, else 8-bit
-/// sRGB. Written beside the target under a temporary name, then renamed. `metadata` is stored where
-/// the format can. Throws InputError for an ending that OpenImageIO does not know, RuntimeError if
-/// writing fails.
+/// values (tone_mapping.h), by default sRGB. Written beside the target under a temporary name, then
+/// renamed. `metadata` is stored where the format can. Throws InputError for an ending that
+/// OpenImageIO does not know, RuntimeError if writing fails.
 void write_image(const std::filesystem::path& file, const Image& image,
                  const std::map<std::string, std::string>& metadata = {});
+void write_image(const std::filesystem::path& file, const Image& image,
+                 const std::map<std::string, std::string>& metadata, const ToneMapping& tones);
 
 /// Named channels of floats, such as diagnostics by pixel.
 struct Layers {

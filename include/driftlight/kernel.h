@@ -22,10 +22,10 @@ class StepDistribution {
   /// `gradient` is null for Drift::None, `divergence_of_inverse` = div(Q^-1) is null without it.
   StepDistribution(const KernelOptions& options, int dimension, const Factor& factor,
                    const Vector* gradient, const Vector* divergence_of_inverse);
-  /// The same from the constraints of a path, if they can be factorised; else from the identity: a
-  /// function of the state, so that the density stays exact. False if something is not finite; then
-  /// there is no distribution.
-  bool assign(const KernelOptions& options, const Linearization& path,
+  /// The same from a dense Q, or if `precision` is null from the constraints of a path, if it can
+  /// be factorised; else from the identity: a function of the state, so that the density stays
+  /// exact. False if something is not finite; then there is no distribution.
+  bool assign(const KernelOptions& options, const Linearization& path, const Matrix* precision,
               const Vector* divergence_of_inverse);
 
   int dimension() const { return dimension_; }
@@ -38,6 +38,7 @@ class StepDistribution {
   double log_density(const Vector& delta, double scale) const;
 
  private:
+  FactorStatus factorise_step(const Linearization& path, const Matrix* precision);
   /// All that follows from the factor.
   void set(const KernelOptions& options, int dimension, const Vector* gradient,
            const Vector* divergence_of_inverse);

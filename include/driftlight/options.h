@@ -19,9 +19,12 @@ enum class Drift {
   Full,      ///< - T T* grad U + div(T T*)
 };
 
+/// Where the matrix of a step comes from (precision.h).
 enum class PreconditionerKind {
   Identity,     ///< the same step in every direction
+  Diagonal,     ///< the diagonal of Q: a step of its own for each coordinate
   Constraints,  ///< Q of the path's constraints (E63.13)
+  Hessian,      ///< the curvature of U
 };
 
 /// How derivatives of a path are found; the results agree to rounding.

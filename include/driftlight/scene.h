@@ -11,6 +11,7 @@
 #include "driftlight/bsdf.h"
 #include "driftlight/emitter.h"
 #include "driftlight/geometry.h"
+#include "driftlight/relief.h"
 #include "driftlight/sensor.h"
 #include "driftlight/warp.h"
 
@@ -21,6 +22,8 @@ namespace driftlight {
 struct Material {
   std::uint32_t front = 0;
   std::optional<std::uint32_t> back;
+  /// Of the surface, seen as it is from either side; null: none.
+  std::shared_ptr<const Relief> relief = nullptr;
 };
 
 /// What constraints and emitter sampling know of a shape, computed when the scene is built.
@@ -40,8 +43,9 @@ struct Shape {
   std::uint32_t material = 0;
   std::optional<std::uint32_t> emitter;
   ShapeExtent extent;
-  bool textured = false;           ///< some BSDF of the material looks at uv
-  DiscreteDistribution triangles;  ///< by area; only for meshes that emit
+  bool textured = false;                 ///< something of the material looks at uv
+  std::shared_ptr<const Relief> relief;  ///< of the material; only of meshes
+  DiscreteDistribution triangles;        ///< by area; only for meshes that emit
 };
 
 /// A point drawn on an emitter, for a connection.
@@ -85,7 +89,10 @@ class Scene {
   template <Scalar T>
   Interaction<T> interact(const Hit& hit, const Ray<T>& ray) const {
     const Shape& shape = shapes()[hit.shape];
-    return driftlight::interact(shape.geometry, hit.primitive, ray, shape.textured);
+    Interaction<T> at = driftlight::interact(shape.geometry, hit.primitive, ray, shape.textured);
+    if (shape.relief != nullptr)
+      relieve(*shape.relief, std::get<TriangleMesh>(shape.geometry), hit.primitive, at);
+    return at;
   }
 
   /// The BSDF that acts on the side of wi, or none for a black back side. On the back side of an
@@ -148,7 +155,7 @@ class SceneBuilder {
   std::uint32_t add_bsdf(Bsdf bsdf);
   std::uint32_t add_material(const Material& material);
   /// With `radiance` the shape is an area emitter. Throws InputError on an empty mesh or one whose
-  /// indices are out of range.
+  /// indices are out of range, and if the material has a relief that the shape cannot carry.
   std::uint32_t add_shape(Geometry geometry, std::uint32_t material,
                           std::optional<Rgbd> radiance = std::nullopt);
   void add_emitter(PointEmitter emitter);

@@ -10,6 +10,7 @@
 
 #include "driftlight/error.h"
 #include "driftlight/scene.h"
+#include "driftlight/tone_mapping.h"
 
 namespace driftlight {
 
@@ -26,6 +27,8 @@ struct LoadedScene {
   /// sampler that is not used, a filter that is replaced, and so on. Nothing in it changes the
   /// picture by more than a blur of a pixel or the digits of a table.
   std::vector<std::string> notices;
+  /// Of an ldrfilm, for files of 8-bit values.
+  ToneMapping tone_mapping = {};
 };
 
 /// Loads a scene. Throws SceneError (a missing or malformed file, an unknown plugin or property, a

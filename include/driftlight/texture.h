@@ -75,9 +75,26 @@ struct BilinearPatch {
     y0 = top_texel + 0.5;
   }
 
+  /// d^2 c / dx dy, which is constant; the other second derivatives are 0.
+  Rgbd mixed() const { return c11 - c01 - (c10 - c00); }
   /// d c / dx and d c / dy at (x, y).
-  Rgbd slope_x(double y) const { return (c10 - c00) + (y - y0) * (c11 - c01 - (c10 - c00)); }
-  Rgbd slope_y(double x) const { return (c01 - c00) + (x - x0) * (c11 - c10 - (c01 - c00)); }
+  template <Scalar T>
+  Rgb<T> slope_x(const T& y) const {
+    return slope<T>(c10 - c00, T(y - y0));
+  }
+  template <Scalar T>
+  Rgb<T> slope_y(const T& x) const {
+    return slope<T>(c01 - c00, T(x - x0));
+  }
+
+ private:
+  template <Scalar T>
+  Rgb<T> slope(const Rgbd& at_edge, const T& across) const {
+    const Rgbd change = mixed();
+    Rgb<T> result;
+    for (int c = 0; c < 3; ++c) result[c] = across * change[c] + at_edge[c];
+    return result;
+  }
 };
 
 /// Bilinear interpolation. The bitmap is an opaque function of doubles; a Jet crosses it by the
@@ -142,10 +159,16 @@ struct Texture {
 
   bool is_constant() const { return bitmap == nullptr && !pattern; }
   /// Derivatives of `eval` by u and by v.
-  struct Slopes {
-    Rgbd u, v;
+  template <Scalar T>
+  struct SlopesOf {
+    Rgb<T> u, v;
   };
-  Slopes slopes(const Vec2d& uv) const;
+  using Slopes = SlopesOf<double>;
+  /// The second ones.
+  struct Curvatures {
+    Rgbd uu, uv, vv;
+  };
+  Curvatures curvatures(const Vec2d& uv) const;
 
   /// Largest value of each component that the texture takes anywhere.
   Rgbd maximum_color() const;
@@ -158,17 +181,44 @@ struct Texture {
     if (is_constant()) return constant<T>(color);
     // Patterns and single texels are constant but for jumps.
     if (pattern || !interpolates) return constant<T>(steps({value(uv.x()), value(uv.y())}));
-    const double width = bitmap->width;
-    const double height = bitmap->height;
-    const Eigen::Matrix2d& m = uv_to_texture;
-    const T x = (uv.x() * m(0, 0) + uv.y() * m(0, 1) + uv_offset.x()) * width;
-    const T y = (uv.x() * m(1, 0) + uv.y() * m(1, 1) + uv_offset.y()) * height;
-    Rgb<T> c = lookup(*bitmap, x, y, wrap_u, wrap_v);
+    const Vec2<T> p = texel_place(uv);
+    Rgb<T> c = lookup(*bitmap, p.x(), p.y(), wrap_u, wrap_v);
     for (int i = 0; i < 3; ++i) c[i] = c[i] * scale[i];
     return c;
   }
 
+  template <Scalar T>
+  SlopesOf<T> slopes(const Vec2<T>& uv) const {
+    if (!is_smooth()) return {constant<T>(Rgbd(0, 0, 0)), constant<T>(Rgbd(0, 0, 0))};
+    const Vec2<T> p = texel_place(uv);
+    const BilinearPatch patch(*bitmap, value(p.x()), value(p.y()), wrap_u, wrap_v);
+    const Rgb<T> slope_x = patch.slope_x(p.y());
+    const Rgb<T> slope_y = patch.slope_y(p.x());
+    const Eigen::Matrix2d m = uv_to_texels();
+    SlopesOf<T> result;
+    for (int i = 0; i < 3; ++i) {
+      result.u[i] = (slope_x[i] * m(0, 0) + slope_y[i] * m(1, 0)) * scale[i];
+      result.v[i] = (slope_x[i] * m(0, 1) + slope_y[i] * m(1, 1)) * scale[i];
+    }
+    return result;
+  }
+
  private:
+  /// True if it has derivatives other than 0.
+  bool is_smooth() const { return bitmap != nullptr && !pattern && interpolates; }
+  /// Coordinates in texels of the bitmap.
+  template <Scalar T>
+  Vec2<T> texel_place(const Vec2<T>& uv) const {
+    const double width = bitmap->width;
+    const double height = bitmap->height;
+    const Eigen::Matrix2d& m = uv_to_texture;
+    return {(uv.x() * m(0, 0) + uv.y() * m(0, 1) + uv_offset.x()) * width,
+            (uv.x() * m(1, 0) + uv.y() * m(1, 1) + uv_offset.y()) * height};
+  }
+  /// Their derivatives by uv.
+  Eigen::Matrix2d uv_to_texels() const {
+    return Vec2d(bitmap->width, bitmap->height).asDiagonal() * uv_to_texture;
+  }
   Vec2d place(const Vec2d& uv) const { return uv_to_texture * uv + uv_offset; }
   /// The colour of the pattern, or of the nearest texel.
   Rgbd steps(const Vec2d& uv) const;

@@ -83,22 +83,25 @@ void write_exposed(const std::filesystem::path& file, Image image, double exposu
 
 /// Writes the images of a contender: its first run, and where that is wrong.
 PagePicture write_pictures(const std::filesystem::path& folder, const Contender& contender,
-                           const std::optional<Image>& reference, double exposure) {
+                           const std::optional<Image>& reference, const Image& expected,
+                           double exposure) {
   const std::string stem = file_stem(contender.choice);
   const Image& image = contender.final_image(0);
   PagePicture picture{contender.choice.name, folder / (stem + ".png"),
                       folder / (stem + "_error.png")};
   write_image(folder / (stem + ".exr"), image, contender.runs.front().metadata);
   write_exposed(picture.image, image, exposure);
-  const std::vector<double> errors =
-      reference ? pixel_errors(image, *reference) : pixel_spread(image, contender.final_image(1));
+  const std::vector<double> errors = reference
+                                         ? pixel_errors(image, *reference)
+                                         : pixel_spread(image, contender.final_image(1), expected);
   write_image(picture.error, error_map(errors, image.width));
   return picture;
 }
 
 void write_all(const std::filesystem::path& folder, const std::vector<Contender>& contenders,
-               const std::optional<Image>& reference, nlohmann::ordered_json& results) {
-  const double exposure = exposure_for(reference ? *reference : contenders.front().final_image(0));
+               const std::optional<Image>& reference, const Image& expected,
+               nlohmann::ordered_json& results) {
+  const double exposure = exposure_for(expected);
   results["exposure"] = exposure;
   std::vector<PagePicture> pictures;
   if (reference) {
@@ -106,7 +109,7 @@ void write_all(const std::filesystem::path& folder, const std::vector<Contender>
     write_exposed(pictures.back().image, *reference, exposure);
   }
   for (const Contender& contender : contenders)
-    pictures.push_back(write_pictures(folder, contender, reference, exposure));
+    pictures.push_back(write_pictures(folder, contender, reference, expected, exposure));
   const std::filesystem::path scale = folder / "error_scale.png";
   write_image(scale, error_scale(256));
   write_text(folder / "results.json", results.dump(2) + "\n");
@@ -116,6 +119,7 @@ void write_all(const std::filesystem::path& folder, const std::vector<Contender>
 
 struct Compared {
   std::vector<Contender> contenders;
+  Image expected;
   nlohmann::ordered_json results;
 };
 
@@ -133,8 +137,10 @@ Compared compare(const LoadedScene& loaded, const CompareCommand& command, const
   const std::size_t complete = contenders.front().runs.size();
   if (complete < static_cast<std::size_t>(command.runs))
     print_notice(fmt::format("stopped early: {} of {} runs of each", complete, command.runs));
-  nlohmann::ordered_json results = comparison_results(command, work, contenders, reference);
-  return {std::move(contenders), std::move(results)};
+  Image expected = expected_image(contenders, reference);
+  nlohmann::ordered_json results =
+      comparison_results(command, work, contenders, reference, expected);
+  return {std::move(contenders), std::move(expected), std::move(results)};
 }
 
 /// What the terminal shows; the table of a study also goes into its folder.
@@ -165,7 +171,7 @@ void run(const CompareCommand& command) {
     if (!pending) pending.emplace(command.folder);
     const std::filesystem::path folder = pending->temporary() / budget.folder;
     std::filesystem::create_directories(folder);
-    write_all(folder, compared.contenders, reference, compared.results);
+    write_all(folder, compared.contenders, reference, compared.expected, compared.results);
     results.push_back(std::move(compared.results));
     written += fmt::format("wrote {}\n", (command.folder / budget.folder / "report.html").string());
   }

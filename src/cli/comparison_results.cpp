@@ -55,11 +55,11 @@ Json error_json(const std::vector<const Snapshot*>& snapshots, const Image& refe
 }
 
 /// Medians over all pairs of runs.
-Json spread_json(const std::vector<const Snapshot*>& snapshots) {
+Json spread_json(const std::vector<const Snapshot*>& snapshots, const Image& expected) {
   std::vector<Spread> pairs;
   for (std::size_t i = 0; i < snapshots.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
-      pairs.push_back(spread(snapshots[i]->image, snapshots[j]->image));
+      pairs.push_back(spread(snapshots[i]->image, snapshots[j]->image, expected));
   if (pairs.empty()) return nullptr;
   return {{"pairs", pairs.size()},
           {"mse", median_of(pairs, [](const Spread& s) { return s.mse; })},
@@ -68,7 +68,7 @@ Json spread_json(const std::vector<const Snapshot*>& snapshots) {
 }
 
 Json moments_json(const Contender& contender, const std::vector<double>& moments,
-                  const std::optional<Image>& reference) {
+                  const std::optional<Image>& reference, const Image& expected) {
   Json all = Json::array();
   for (const double fraction : moments) {
     const std::vector<const Snapshot*> snapshots = snapshots_at(contender, fraction);
@@ -78,7 +78,7 @@ Json moments_json(const Contender& contender, const std::vector<double>& moments
                    {"seconds", median_of(snapshots, [](const Snapshot* s) { return s->seconds; })},
                    {"work", median_of(snapshots, [](const Snapshot* s) { return s->work; })},
                    {"error", reference ? error_json(snapshots, *reference) : Json()},
-                   {"spread", spread_json(snapshots)}});
+                   {"spread", spread_json(snapshots, expected)}});
   }
   return all;
 }
@@ -166,7 +166,7 @@ Json families_json(const Contender& contender) {
 }
 
 Json contender_json(const Contender& contender, const std::vector<double>& moments,
-                    const std::optional<Image>& reference) {
+                    const std::optional<Image>& reference, const Image& expected) {
   const std::vector<Moments> tiles = tiles_over_runs(contender);
   const double seconds =
       median_of(contender.runs, [](const Run& run) { return run.snapshots.back().seconds; });
@@ -187,7 +187,7 @@ Json contender_json(const Contender& contender, const std::vector<double>& momen
            counts_mutations(contender.options) ? "mutations per pixel" : "samples per pixel"},
           {"files",
            {{"exr", stem + ".exr"}, {"png", stem + ".png"}, {"error_png", stem + "_error.png"}}},
-          {"moments", moments_json(contender, moments, reference)},
+          {"moments", moments_json(contender, moments, reference, expected)},
           {"brightness", brightness_json(contender, reference)},
           {"tile_test", reference ? tile_test_json(tiles, *reference) : Json()},
           {"agreement", agreement_json(contender)},
@@ -211,14 +211,25 @@ std::string cell(const Json& object, const char* name) {
 
 }  // namespace
 
+Image expected_image(const std::vector<Contender>& contenders,
+                     const std::optional<Image>& reference) {
+  if (reference) return *reference;
+  std::vector<const Image*> images;
+  for (const Contender& contender : contenders)
+    for (std::size_t run = 0; run < contender.runs.size(); ++run)
+      images.push_back(&contender.final_image(run));
+  return median_image(images);
+}
+
 nlohmann::ordered_json comparison_results(const CompareCommand& command, const Work& work,
                                           const std::vector<Contender>& contenders,
-                                          const std::optional<Image>& reference) {
+                                          const std::optional<Image>& reference,
+                                          const Image& expected) {
   const Image& first = contenders.front().final_image(0);
   const std::vector<double> moments = moments_of(work);
   Json all = Json::array();
   for (const Contender& contender : contenders)
-    all.push_back(contender_json(contender, moments, reference));
+    all.push_back(contender_json(contender, moments, reference, expected));
   Json budget = Json::object();
   if (work.time) budget["seconds"] = *work.time;
   if (work.samples_per_pixel) budget["samples_per_pixel"] = *work.samples_per_pixel;

@@ -12,11 +12,17 @@
 
 namespace driftlight::cli {
 
+/// The reference, or without one the median image of all runs.
+Image expected_image(const std::vector<Contender>& contenders,
+                     const std::optional<Image>& reference);
+
 /// All of results.json. Of several runs of one moment it gives medians, of spreads those over all
-/// pairs of runs. What there is no reference, or no kernel, for is null.
+/// pairs of runs, relative to what is expected. What there is no reference, or no kernel, for is
+/// null.
 nlohmann::ordered_json comparison_results(const CompareCommand& command, const Work& work,
                                           const std::vector<Contender>& contenders,
-                                          const std::optional<Image>& reference);
+                                          const std::optional<Image>& reference,
+                                          const Image& expected);
 
 /// A line for each integrator and moment, from what `comparison_results` gave.
 std::string csv_text(const nlohmann::ordered_json& results);

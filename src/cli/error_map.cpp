@@ -45,18 +45,17 @@ Image picture(const std::vector<double>& positions, int width) {
   return image;
 }
 
-/// `share` of (I - R)^2 / (R^2 + 0.01), R by value.
-template <class Reference>
-std::vector<double> root_errors(const Image& image, double share, const Reference& reference) {
-  std::vector<double> errors(image.rgb.size() / 3);
-  for (std::size_t i = 0; i < errors.size(); ++i) {
+/// Of (I - J)^2 / (M^2 + 0.01) times the share.
+std::vector<double> root_errors(const Image& i, const Image& j, const Image& m, double share) {
+  std::vector<double> errors(i.rgb.size() / 3);
+  for (std::size_t k = 0; k < errors.size(); ++k) {
     double sum = 0;
-    for (std::size_t c = 3 * i; c < 3 * i + 3; ++c) {
-      const double r = reference(c);
-      const double difference = static_cast<double>(image.rgb[c]) - r;
-      sum += difference * difference / (r * r + 0.01);
+    for (std::size_t c = 3 * k; c < 3 * k + 3; ++c) {
+      const double difference = static_cast<double>(i.rgb[c]) - static_cast<double>(j.rgb[c]);
+      const auto expected = static_cast<double>(m.rgb[c]);
+      sum += difference * difference / (expected * expected + 0.01);
     }
-    errors[i] = std::sqrt(share * sum / 3.0);
+    errors[k] = std::sqrt(share * sum / 3.0);
   }
   return errors;
 }
@@ -64,15 +63,11 @@ std::vector<double> root_errors(const Image& image, double share, const Referenc
 }  // namespace
 
 std::vector<double> pixel_errors(const Image& image, const Image& reference) {
-  return root_errors(image, 1.0,
-                     [&](std::size_t i) { return static_cast<double>(reference.rgb[i]); });
+  return root_errors(image, reference, reference, 1.0);
 }
 
-std::vector<double> pixel_spread(const Image& a, const Image& b) {
-  // (a - M)^2 is half of half the squared difference.
-  return root_errors(a, 2.0, [&](std::size_t i) {
-    return 0.5 * (static_cast<double>(a.rgb[i]) + static_cast<double>(b.rgb[i]));
-  });
+std::vector<double> pixel_spread(const Image& a, const Image& b, const Image& expected) {
+  return root_errors(a, b, expected, 0.5);
 }
 
 Image error_map(const std::vector<double>& errors, int width) {

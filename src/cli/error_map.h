@@ -16,8 +16,8 @@ inline constexpr double kLargestError = 1;
 /// (I - R)^2 / (R^2 + 0.01).
 std::vector<double> pixel_errors(const Image& image, const Image& reference);
 
-/// The same by the spread of two runs: of (a - b)^2 / 2 / (M^2 + 0.01), M their mean.
-std::vector<double> pixel_spread(const Image& a, const Image& b);
+/// The same by the spread of two runs: of (a - b)^2 / 2 / (M^2 + 0.01), M what is expected.
+std::vector<double> pixel_spread(const Image& a, const Image& b, const Image& expected);
 
 /// Errors as colours from black by red to light yellow; rows from the top.
 Image error_map(const std::vector<double>& errors, int width);

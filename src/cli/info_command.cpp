@@ -60,7 +60,7 @@ std::string list_shapes(std::span<const Shape> shapes) {
 }
 
 /// "2 bitmap (64 x 64, 1024 x 512), 1 checkerboard"; a bitmap that several materials share is one.
-std::string list_textures(std::span<const Bsdf> bsdfs) {
+std::string list_textures(const Scene& scene) {
   constexpr std::array<std::string_view, 2> kPatterns{"checkerboard", "grid"};
   Counts<2> patterns{};
   std::set<const Bitmap*> seen;
@@ -71,7 +71,9 @@ std::string list_textures(std::span<const Bsdf> bsdfs) {
     if (bitmap != nullptr && seen.insert(bitmap).second)
       sizes.push_back(fmt::format("{} x {}", bitmap->width, bitmap->height));
   };
-  for (const Bsdf& bsdf : bsdfs) for_each_texture(bsdf, add);
+  for (const Bsdf& bsdf : scene.bsdfs()) for_each_texture(bsdf, add);
+  for (const Material& material : scene.materials())
+    if (material.relief != nullptr) add(material.relief->texture);
   const std::string others = list(patterns, kPatterns);
   if (sizes.empty()) return others;
   const std::string bitmaps = fmt::format("{} bitmap ({})", sizes.size(), fmt::join(sizes, ", "));
@@ -139,7 +141,7 @@ void run(const InfoCommand& command) {
   text += row("bounds", describe_bounds(scene));
   text += row("shapes", list_shapes(scene.shapes()));
   text += row("bsdfs", list(count_kinds(scene.bsdfs()), kBsdfs));
-  text += row("textures", list_textures(scene.bsdfs()));
+  text += row("textures", list_textures(scene));
   text += row("emitters", list(count_kinds(scene.emitters()), kEmitters));
   for (const std::string& notice : loaded.notices) text += row("notice", notice);
   print(text);

@@ -77,11 +77,11 @@ void check_settings(const RenderCommand& command, const IntegratorOptions& optio
         "--check-gradients: drift=none with preconditioner=identity uses no derivatives");
 }
 
-void write_outputs(const RenderCommand& command, const Image& image, const RenderOptions& render,
-                   Report& report, const Talk& talk) {
+void write_outputs(const RenderCommand& command, const Image& image, const ToneMapping& tones,
+                   const RenderOptions& render, Report& report, const Talk& talk) {
   const Stopwatch watch;
   for (const auto& file : command.outputs) {
-    write_image(file, image, report.metadata);
+    write_image(file, image, report.metadata, tones);
     report.summary.push_back(fmt::format("wrote {}", file.string()));
   }
   if (render.layers != nullptr) {
@@ -145,7 +145,7 @@ void run(const RenderCommand& command) {
   if (report.stopped) talk.notice("stopped early: the image holds what was rendered so far");
   for (const std::string& warning : report.warnings) talk.notice(warning);
   report.statistics["seconds"]["load"] = load_seconds;
-  write_outputs(command, image, how, report, talk);
+  write_outputs(command, image, loaded.tone_mapping, how, report, talk);
   if (!report.failure.empty()) throw RuntimeError(report.failure);
 }
 

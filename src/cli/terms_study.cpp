@@ -19,10 +19,12 @@ struct Term {
   Settings settings;
 };
 
-const std::array<Term, 2>& preconditioners() {
-  static const std::array<Term, 2> terms{
+const std::array<Term, 4>& preconditioners() {
+  static const std::array<Term, 4> terms{
       {{"identity", {{"preconditioner", "identity"}, {"scale", "0.012"}}},
-       {"constraints", {{"preconditioner", "constraints"}}}}};
+       {"diagonal", {{"preconditioner", "diagonal"}}},
+       {"constraints", {{"preconditioner", "constraints"}}},
+       {"hessian", {{"preconditioner", "hessian"}}}}};
   return terms;
 }
 

@@ -12,6 +12,7 @@
 #include "color_xml.h"
 #include "properties.h"
 #include "refractive_indices.h"
+#include "relief_xml.h"
 #include "text.h"
 #include "textures_xml.h"
 
@@ -195,7 +196,7 @@ Surface read_mask(Properties& properties, LoadContext& context) {
   const Texture opacity = read_scalar(properties, "opacity", 0.5, context);
   if (opacity.maximum() > 1.0) properties.fail("opacity", "must be between 0 and 1");
   const auto masked = [&](const Bsdf& bsdf) { return Mask{opacity, boxed(bsdf)}; };
-  Surface result{masked(surface->front), std::nullopt, std::nullopt};
+  Surface result{masked(surface->front), std::nullopt, std::nullopt, surface->relief};
   if (surface->back)
     result.back = masked(*surface->back);
   else if (!is_transmissive(surface->front))
@@ -209,13 +210,15 @@ Surface blend(const Element& element, const Texture& weight, const Surface& firs
   const bool transmits = is_transmissive(first.front) || is_transmissive(second.front);
   if (transmits && (first.back || second.back))
     element.fail("what transmits cannot be blended with what is twosided or a mask");
+  if (first.relief != second.relief)
+    element.fail("bump and normal maps cannot be blended; a blend can be nested in one");
   const auto through = [](const Surface& s) {
     return has_delta(s.front, Scattering::Transmission);
   };
   if (through(first) && through(second) && delta_eta(first.front) != delta_eta(second.front))
     element.fail("smooth bsdfs that refract differently cannot be blended");
-  Surface result{Blend{weight, boxed(first.front), boxed(second.front)}, std::nullopt,
-                 std::nullopt};
+  Surface result{Blend{weight, boxed(first.front), boxed(second.front)}, std::nullopt, std::nullopt,
+                 first.relief};
   const Bsdf black = Diffuse{Texture(Rgbd::Zero())};
   if (first.back || second.back)
     result.back =
@@ -295,7 +298,7 @@ Surface read_mixture(Properties& properties, LoadContext& context) {
     so_far += weights[i];
     result = mix(result, *next, so_far > 0.0 ? weights[i] / so_far : 0.0);
   }
-  const Surface black{Diffuse{Texture(Rgbd::Zero())}, std::nullopt, std::nullopt};
+  const Surface black{Diffuse{Texture(Rgbd::Zero())}, std::nullopt, std::nullopt, result.relief};
   return sum < 1.0 - 1e-9 ? mix(result, black, 1.0 - sum) : result;
 }
 
@@ -304,15 +307,19 @@ Surface read_two_sided(Properties& properties, LoadContext& context) {
   if (nested.empty() || nested.size() > 2)
     properties.element().fail("a twosided bsdf needs one or two nested bsdfs");
   std::vector<Bsdf> sides;
+  std::shared_ptr<const Relief> relief;
   for (const Element& element : nested) {
     const std::shared_ptr<Surface> side = read_surface(element, context);
     const bool transmits = has_delta(side->front, Scattering::Transmission);
     if (side->back || transmits || is_transmissive(side->front))
       element.fail("only a one-sided bsdf without transmission can be nested in twosided");
+    if (!sides.empty() && side->relief != relief)
+      element.fail("bump and normal maps cannot differ by side; a twosided can be nested in one");
+    relief = side->relief;
     sides.push_back(side->front);
   }
   properties.ignore({"ensureEnergyConservation"});
-  return {sides.front(), sides.back(), std::nullopt};
+  return {sides.front(), sides.back(), std::nullopt, relief};
 }
 
 template <Bsdf (*Read)(Properties&, LoadContext&)>
@@ -321,7 +328,7 @@ Surface one_sided(Properties& properties, LoadContext& context) {
 }
 
 using BsdfReader = Surface (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, BsdfReader>, 14> kBsdfs{{
+constexpr std::array<std::pair<std::string_view, BsdfReader>, 16> kBsdfs{{
     {"diffuse", &one_sided<read_diffuse>},
     {"conductor", &one_sided<read_conductor>},
     {"roughconductor", &one_sided<read_rough_conductor>},
@@ -336,6 +343,8 @@ constexpr std::array<std::pair<std::string_view, BsdfReader>, 14> kBsdfs{{
     {"blendbsdf", &read_blend},
     {"mixturebsdf", &read_mixture},
     {"twosided", &read_two_sided},
+    {"bumpmap", &read_bump_map},
+    {"normalmap", &read_normal_map},
 }};
 
 }  // namespace
@@ -356,7 +365,7 @@ std::shared_ptr<Surface> read_surface(const Element& element, LoadContext& conte
 
 std::uint32_t material_index(Surface& surface, LoadContext& context) {
   if (!surface.material) {
-    Material material{context.builder.add_bsdf(surface.front), std::nullopt};
+    Material material{context.builder.add_bsdf(surface.front), std::nullopt, surface.relief};
     if (surface.back) material.back = context.builder.add_bsdf(*surface.back);
     surface.material = context.builder.add_material(material);
   }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "driftlight/scene.h"
+#include "driftlight/tone_mapping.h"
 #include "xml_document.h"
 
 namespace driftlight {
@@ -23,6 +24,7 @@ struct Surface {
   std::optional<Bsdf> back;
   /// Index in the scene, once some shape has needed it.
   std::optional<std::uint32_t> material;
+  std::shared_ptr<const Relief> relief = nullptr;
 };
 
 /// What a <shape type="shapegroup"> stands for, in its own space.
@@ -73,6 +75,12 @@ class NamedObjects {
     pending_.pop_back();
   }
 
+  /// True if <ref id="..."/> names a T. Throws SceneError if it names nothing.
+  template <class T>
+  bool names(const Element& ref) const {
+    return std::holds_alternative<T>(find(ref));
+  }
+
   /// The object that <ref id="..."/> names; `kind` ("bsdf") is for messages. Throws SceneError if
   /// there is none, it is of another kind, is defined only further down, or contains the <ref>.
   template <class T>
@@ -101,6 +109,7 @@ struct LoadContext {
   SceneBuilder builder;
   NamedObjects objects;
   std::vector<std::string> notices;
+  ToneMapping tone_mapping = {};
   std::size_t shape_count = 0;
   std::size_t instanced_triangles = 0;
 

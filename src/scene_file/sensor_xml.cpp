@@ -113,6 +113,19 @@ FilmSize read_size(Properties& film) {
   return size;
 }
 
+/// The properties of an ldrfilm.
+ToneMapping read_tone_mapping(Properties& film) {
+  ToneMapping tones;
+  const std::string method = film.choice("tonemapMethod", "gamma", {"gamma", "reinhard"});
+  if (method == "reinhard") tones.op = ToneMapping::Operator::Reinhard;
+  tones.exposure = film.number("exposure", 0.0);
+  tones.key = film.positive("key", 0.18);
+  tones.burn = film.non_negative("burn", 0.0);
+  if (tones.burn > 1.0) film.fail("burn", "must be between 0 and 1");
+  if (film.number("gamma", -1.0) != -1.0) tones.gamma = film.positive("gamma", 1.0);
+  return tones;
+}
+
 FilmSize read_film(const Element& element, LoadContext& context) {
   Properties film(element);
   const std::array<std::pair<std::string_view, bool>, 2> kinds{
@@ -123,10 +136,7 @@ FilmSize read_film(const Element& element, LoadContext& context) {
   size.filter = read_filter(film);
   film.ignore({"fileFormat", "pixelFormat", "componentFormat", "channelNames", "banner",
                "attachLog", "highQualityEdges", "filename", "sampleBorder", "compensate"});
-  if (tone_mapped) {
-    film.ignore({"gamma", "exposure", "tonemapMethod", "key", "burn"});
-    context.notice(element, "the tone mapping of ldrfilm is not used: images hold radiance");
-  }
+  if (tone_mapped) context.tone_mapping = read_tone_mapping(film);
   film.finish();
   return size;
 }

@@ -9,12 +9,6 @@
 namespace driftlight {
 namespace {
 
-Texture resolve_texture(const Element& ref, LoadContext& context) {
-  context.objects.read_ahead(ref, "texture",
-                             [&](const Element& target) { read_texture(target, context); });
-  return context.objects.resolve<Texture>(ref, "texture");
-}
-
 /// The place of uv on the texture: in Mitsuba 0.6 by scales and offsets, in Mitsuba 3 by a
 /// transform.
 void read_mapping(Properties& properties, Texture& texture) {
@@ -96,8 +90,7 @@ Texture read_scaled(Properties& properties, LoadContext& context) {
   if (properties.has("value")) texture = Texture(properties.color("value", kWhite));
   for (const Element& nested : properties.nested({"texture", "ref"})) {
     if (texture) nested.fail("a second texture to scale");
-    texture =
-        nested.tag() == "ref" ? resolve_texture(nested, context) : read_texture(nested, context);
+    texture = read_texture(nested, context);
   }
   if (!texture) properties.element().fail("texture 'scale' needs a texture or a 'value' to scale");
   scale(*texture, by);
@@ -122,6 +115,11 @@ std::optional<Gamma> read_gamma(Properties& properties) {
 }
 
 Texture read_texture(const Element& element, LoadContext& context) {
+  if (element.tag() == "ref") {
+    context.objects.read_ahead(element, "texture",
+                               [&](const Element& target) { read_texture(target, context); });
+    return context.objects.resolve<Texture>(element, "texture");
+  }
   if (const auto* read = context.objects.find_read<Texture>(element)) return *read;
   Properties properties(element);
   Texture texture = find_plugin(kTextures, properties)(properties, context);
@@ -133,8 +131,8 @@ Texture read_texture(const Element& element, LoadContext& context) {
 Texture read_textured(Properties& properties, std::string_view name, const Rgbd& fallback,
                       LoadContext& context) {
   const auto child = properties.find(name);
-  if (child && child->tag() == "texture") return read_texture(*child, context);
-  if (child && child->tag() == "ref") return resolve_texture(*child, context);
+  if (child && (child->tag() == "texture" || child->tag() == "ref"))
+    return read_texture(*child, context);
   return Texture(properties.color(name, fallback));
 }
 

@@ -8,7 +8,7 @@
 
 namespace driftlight {
 
-/// <texture> of type bitmap, checkerboard, gridtexture or scale.
+/// <texture> of type bitmap, checkerboard, gridtexture or scale, or a <ref> to one.
 Texture read_texture(const Element& element, LoadContext& context);
 
 /// A property that may be a colour, a <texture> or a <ref> to one.

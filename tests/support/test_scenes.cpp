@@ -145,18 +145,33 @@ Sphere sphere_at(const Vec3d& center, double radius) {
 /// A builder that makes a material of each BSDF it is given.
 class Workshop {
  public:
-  std::uint32_t one_sided(Bsdf bsdf) {
-    return builder_.add_material({builder_.add_bsdf(std::move(bsdf)), std::nullopt});
+  using ReliefPointer = std::shared_ptr<const Relief>;
+
+  std::uint32_t one_sided(Bsdf bsdf, const ReliefPointer& relief = nullptr) {
+    return builder_.add_material({builder_.add_bsdf(std::move(bsdf)), std::nullopt, relief});
   }
-  std::uint32_t two_sided(Bsdf front, Bsdf back) {
+  std::uint32_t two_sided(Bsdf front, Bsdf back, const ReliefPointer& relief = nullptr) {
     const auto f = builder_.add_bsdf(std::move(front));
-    return builder_.add_material({f, builder_.add_bsdf(std::move(back))});
+    return builder_.add_material({f, builder_.add_bsdf(std::move(back)), relief});
   }
   SceneBuilder* operator->() { return &builder_; }
 
  private:
   SceneBuilder builder_;
 };
+
+std::shared_ptr<const Relief> bumps(double scale) {
+  return std::make_shared<const Relief>(Relief{Relief::Kind::Bumps, textured(8, 0.0, 1.0), scale});
+}
+
+/// A map of normals that are up to a fourth off the surface's.
+std::shared_ptr<const Relief> tilts() {
+  Bitmap bitmap = *pattern_bitmap(8, 8, 0.4, 0.6);
+  for (Eigen::Array3f& texel : bitmap.texels) texel[2] = 0.9F;
+  Texture texture = textured(8, 0.0, 1.0);
+  texture.bitmap = std::make_shared<const Bitmap>(std::move(bitmap));
+  return std::make_shared<const Relief>(Relief{Relief::Kind::Normals, texture, 1.0});
+}
 
 Microfacets beckmann(double alpha) { return {Distribution::Beckmann, alpha}; }
 Microfacets ggx(double alpha) { return {Distribution::Ggx, alpha}; }
@@ -331,10 +346,12 @@ Scene coated(bool with_point) {
 Scene plan(bool with_caustics) {
   Workshop make;
   const auto plain = make.one_sided(Diffuse{gray(0.7)});
-  add_walls(make, make.one_sided(Phong{textured(8, 0.2, 0.6), gray(0.3), 15}), plain, plain);
+  const auto floor = make.one_sided(Phong{textured(8, 0.2, 0.6), gray(0.3), 15}, tilts());
+  add_walls(make, floor, plain, plain);
   make->add_shape(sphere_at({-0.8, 0.5, 0.2}, 0.5),
                   make.one_sided(RoughConductor{ggx(0.25), kGoldEta, kGoldK, gray(1.0)}));
-  make->add_shape(round_mesh({0.5, 0.5, -0.3}, 0.5, 8), plain);
+  make->add_shape(round_mesh({0.5, 0.5, -0.3}, 0.5, 8),
+                  make.one_sided(Diffuse{gray(0.7)}, bumps(-0.08)));
   const Texture weight = textured(8, 0.1, 0.9);
   make->add_shape(
       sphere_at({-1.3, 0.35, 1.1}, 0.35),
@@ -346,13 +363,15 @@ Scene plan(bool with_caustics) {
           Blend{weight, boxed(Plastic(kGlass, gray(0.5), gray(1.0), false)),
                 boxed(Blend{gray(0.3), boxed(Phong{gray(0.3), gray(0.4), 20}),
                             boxed(Conductor{kGoldEta, kGoldK, gray(1.0)})})},
-          Blend{weight, boxed(Diffuse{gray(0.7)}), boxed(Conductor{kGoldEta, kGoldK, gray(1.0)})}));
+          Blend{weight, boxed(Diffuse{gray(0.7)}), boxed(Conductor{kGoldEta, kGoldK, gray(1.0)})},
+          bumps(0.04)));
   if (with_caustics) {
     make->add_shape(
         round_mesh({0.6, 0.3, 1.2}, 0.3, 6),
         make.one_sided(Blend{weight, boxed(RoughDielectric{ggx(0.2), kGlass, gray(1.0), gray(1.0)}),
                              boxed(Blend{gray(0.5), boxed(Dielectric{kGlass, gray(1.0), gray(1.0)}),
-                                         boxed(Diffuse{gray(0.6)})})}));
+                                         boxed(Diffuse{gray(0.6)})})},
+                       tilts()));
     make->add_shape(sphere_at({-0.1, 0.3, 0.9}, 0.3),
                     make.one_sided(Dielectric{kGlass, gray(1.0), gray(1.0)}));
     make->add_shape(sphere_at({1.2, 0.4, 0.6}, 0.4),

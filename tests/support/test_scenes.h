@@ -25,7 +25,7 @@ struct TestScene {
 ///   stage      diffuse and glossy things under a spot and parallel light, behind smooth glass
 ///   coated     smooth and rough plastic, panes, masks and what only lets pass
 ///   plan       diffuse, glossy and smooth things and blends of them under area emitters, a spot
-///              and parallel light, as an orthographic camera sees them
+///              and parallel light, as an orthographic camera sees them; bump and normal maps
 const std::vector<TestScene>& test_scenes();
 
 /// With films of 32 x 24 pixels; path tracing finds all light of the first without the point

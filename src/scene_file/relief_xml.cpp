@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "relief_xml.h"
+
+#include <utility>
+
+#include "bsdfs_xml.h"
+#include "textures_xml.h"
+
+namespace driftlight {
+namespace {
+
+bool is_texture(const Element& element, LoadContext& context) {
+  if (element.tag() != "ref") return element.tag() == "texture";
+  context.objects.read_ahead(element, "texture",
+                             [&](const Element& target) { read_texture(target, context); });
+  context.objects.read_ahead(element, "bsdf",
+                             [&](const Element& target) { read_surface(target, context); });
+  return context.objects.names<Texture>(element);
+}
+
+/// The nested bsdf, with this relief but for its texture.
+Surface read_relief(Properties& properties, LoadContext& context, Relief relief) {
+  std::optional<Texture> texture;
+  std::shared_ptr<Surface> nested;
+  for (const Element& element : properties.nested({"texture", "bsdf", "ref"})) {
+    if (is_texture(element, context)) {
+      if (texture) element.fail("a second texture of " + properties.description());
+      texture = read_texture(element, context);
+    } else {
+      if (nested) element.fail("a second nested bsdf of " + properties.description());
+      nested = read_surface(element, context);
+    }
+  }
+  if (!texture || !nested)
+    properties.element().fail(properties.description() + " needs a texture and a nested bsdf");
+  if (nested->relief)
+    properties.element().fail("bump and normal maps cannot be nested in each other");
+  relief.texture = *texture;
+  Surface result = *nested;
+  result.material.reset();
+  result.relief = std::make_shared<const Relief>(std::move(relief));
+  return result;
+}
+
+}  // namespace
+
+Surface read_bump_map(Properties& properties, LoadContext& context) {
+  const double scale = properties.number("scale", 1.0);
+  return read_relief(properties, context, {Relief::Kind::Bumps, {}, scale});
+}
+
+Surface read_normal_map(Properties& properties, LoadContext& context) {
+  properties.ignore({"flipInvalidNormals"});  // they are
+  if (properties.boolean("useShadowingFunction", false))
+    context.notice(properties.element(), "the shadowing function of normal maps is left out");
+  return read_relief(properties, context, {Relief::Kind::Normals, {}, 1.0});
+}
+
+}  // namespace driftlight
