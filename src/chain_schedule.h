@@ -9,6 +9,18 @@
 
 namespace driftlight {
 
+/// Least deposit of a mutation, in units of the brightness of a pixel's sample: below it more
+/// mutations no longer pay.
+inline constexpr double kLeastDeposit = 0.2;
+/// What a mutation costs in bidirectional samples.
+inline constexpr double kMutationCost = 0.3;
+
+/// Deposit of a mutation where samples leave so much light in the mean, for at most so many
+/// mutations a sample.
+inline double deposit_for(double mean_light, double mutations_per_sample) {
+  return std::max(kLeastDeposit, mean_light / mutations_per_sample);
+}
+
 /// `chains` of `mutations` each; every mutation deposits `deposit`. In the mean over u they deposit
 /// the whole light.
 struct ChainSchedule {

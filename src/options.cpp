@@ -160,8 +160,9 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
       number("second_scale", options.second_scale, positive,
              "chain: scale of that second step, over that of the first"),
       direct(options.direct),
-      number("threshold", redistribution.threshold, positive,
-             "redistribution: samples keep so many times the local brightness"),
+      number_or_auto("threshold", redistribution.threshold, positive,
+                     "redistribution: samples keep so many times the local brightness; auto: from "
+                     "a pilot"),
       number("chain_length", redistribution.chain_length, Range<int>{1, 1000000},
              "redistribution: mutations of a chain"),
       number("mutations_per_sample", redistribution.mutations_per_sample, positive,

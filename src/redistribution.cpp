@@ -13,20 +13,16 @@
 #include "driftlight/error.h"
 #include "driftlight/film.h"
 #include "exact_sum.h"
-#include "found_path.h"
 #include "pass_loop.h"
 #include "pilot.h"
 #include "probed_starts.h"
 #include "remainder.h"
 #include "sample_film.h"
 #include "splitting_share.h"
+#include "threshold_pilot.h"
 
 namespace driftlight {
 namespace {
-
-/// Least deposit of a mutation, in units of the brightness of a pixel's sample: below it more
-/// mutations no longer pay.
-constexpr double kLeastDeposit = 0.2;
 
 /// What all samples of a render share.
 struct Redistribution {
@@ -47,18 +43,21 @@ struct Redistribution {
         options(with),
         layers(render.layers),
         pilot(run_pilot(scene, options, render.seed)),
-        remainder(scene, pilot.guide, pilot.brightness, options.redistribution.threshold),
+        remainder(scene, pilot.guide, pilot.brightness,
+                  options.redistribution.threshold.value_or(kLeastThreshold)),
         film(scene.camera().film_width, scene.camera().film_height, scene.camera().filter),
         unit(64.0 * pilot.brightness.max()),
         deposit(kLeastDeposit),
         splitting(scene, options, render, remainder, pilot.brightness, unit) {
     if (render.check_gradients) probed.emplace(scene, options, render.seed);
+    if (!options.redistribution.threshold)
+      remainder.set_tau(choose_threshold(scene, options, pilot, remainder, splitting, render.seed));
   }
 
   /// From the mean remainder of a sample so far.
   void set_deposit(double samples) {
-    const double mean = remainders.value() / samples;
-    deposit = std::max(kLeastDeposit, mean / options.redistribution.mutations_per_sample);
+    deposit =
+        deposit_for(remainders.value() / samples, options.redistribution.mutations_per_sample);
   }
 
   /// Of the films, in the mean of so many passes.
@@ -111,13 +110,9 @@ class RedistributionSampler {
   }
 
  private:
-  /// A path with a remainder, times its roulette.
   struct Start {
-    PathTopology topology;
-    PathCoordinates coordinates;
-    Contribution contribution;
-    Share share;
-    double remainder;
+    BrightPath path;
+    double remainder;  ///< times its roulette
   };
 
   /// Puts on the film what samples carry.
@@ -136,18 +131,12 @@ class RedistributionSampler {
 
   /// min(w, tau) / w; keeps the path as a start if that is below 1.
   double share_of_sample(const Vec2d& film, const Rgbd& value, const FoundPath& path) {
-    // By balance weights the value is f / q.
-    const double w = luminance(value) / (path.roulette * common_.pilot.brightness(film));
-    if (!(w > common_.remainder.tau())) return 1.0;
-    const auto sample = state_of(common_.scene, path, common_.options.phase_space);
-    if (!sample) return 1.0;
-    Start start{sample->topology, sample->coordinates,
-                contribution(common_.scene, sample->topology, sample->coordinates), Share{}, 0.0};
-    start.share = common_.remainder.share(start.topology, start.coordinates, start.contribution);
-    if (!std::isfinite(start.share.log_remainder)) return 1.0;
-    start.remainder = path.roulette * start.share.excess();
-    if (!common_.splitting.takes(start.topology)) starts_.push_back(start);
-    return start.share.tau / start.share.w;
+    const double w = common_.remainder.weight(film, value, path);
+    const auto bright = common_.remainder.bright_path(w, path, common_.options.phase_space);
+    if (!bright) return 1.0;
+    if (!common_.splitting.takes(bright->topology))
+      starts_.push_back({*bright, path.roulette * bright->share.excess()});
+    return bright->share.tau / bright->share.w;
   }
 
   /// By chains of mutations that deposit epsilon each.
@@ -157,10 +146,11 @@ class RedistributionSampler {
     const ChainSchedule plan = schedule_chains(start.remainder, common_.deposit, length, rng);
     if (!(plan.chains > 0.0)) return;
     std::optional<GradientProbe> probe =
-        common_.probed ? common_.probed->probe(start.contribution, plan.chains * plan.mutations)
-                       : std::nullopt;
+        common_.probed
+            ? common_.probed->probe(start.path.contribution, plan.chains * plan.mutations)
+            : std::nullopt;
     chain_.observe(probe ? &*probe : nullptr);
-    chain_.start_at(start.topology, start.coordinates, start.contribution, start.share);
+    chain_.start_at(start.path);
     for (double i = 0; i < plan.chains; ++i)
       chain_.run(static_cast<std::uint64_t>(plan.mutations), rng,
                  [&](const Share& share, const Rgbd& color, double weight) {
@@ -229,6 +219,7 @@ LangevinResult render_redistribution(const Scene& scene, const LangevinOptions& 
   if (!(result.statistics.b > 0.0) && !samples.stopped)
     throw InputError("no path from the sensor to an emitter carries light");
   result.statistics.remainder = mean_luminance(chains);
+  result.statistics.threshold = common.remainder.tau();
   result.statistics.samples_per_pixel = samples.samples_per_pixel;
   result.statistics.stopped = samples.stopped;
   result.statistics.bootstrap_seconds = pilot_seconds;

@@ -15,6 +15,18 @@ constexpr double kSeenTau = 16;
 
 }  // namespace
 
+std::optional<BrightPath> Remainder::bright_path(double weight, const FoundPath& path,
+                                                 PhaseSpace phase_space) const {
+  if (!(weight > tau_)) return std::nullopt;
+  const auto sample = state_of(scene_, path, phase_space);
+  if (!sample) return std::nullopt;
+  BrightPath bright{sample->topology, sample->coordinates,
+                    contribution(scene_, sample->topology, sample->coordinates), Share{}};
+  bright.share = share(bright.topology, bright.coordinates, bright.contribution);
+  if (!std::isfinite(bright.share.log_remainder)) return std::nullopt;
+  return bright;
+}
+
 Share Remainder::share(const PathTopology& topology, const PathCoordinates& coordinates,
                        const Contribution& contribution) const {
   const StrategyDensities densities = strategy_densities(scene_, guide_, topology, coordinates);
@@ -34,13 +46,12 @@ Share Remainder::share(const PathTopology& topology, const PathCoordinates& coor
   return share;
 }
 
-void RemainderChain::start_at(const PathTopology& topology, const PathCoordinates& coordinates,
-                              const Contribution& contribution, const Share& share) {
-  start_.state.topology = topology;
-  start_.state.coordinates = coordinates;
-  start_.state.contribution = contribution;
+void RemainderChain::start_at(const BrightPath& path) {
+  start_.state.topology = path.topology;
+  start_.state.coordinates = path.coordinates;
+  start_.state.contribution = path.contribution;
   start_.state.has_step = false;
-  start_.share = share;
+  start_.share = path.share;
 }
 
 double RemainderChain::propose(Visit& from, Visit& to, Rng& rng) {

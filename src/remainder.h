@@ -14,11 +14,13 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "brightness_map.h"
 #include "driftlight/small_step.h"
 #include "emission_guide.h"
+#include "found_path.h"
 
 namespace driftlight {
 
@@ -34,6 +36,14 @@ struct Share {
   double excess() const { return std::max(0.0, w - tau); }
 };
 
+/// A path that samples do not carry whole: chains start from it.
+struct BrightPath {
+  PathTopology topology;
+  PathCoordinates coordinates;
+  Contribution contribution;
+  Share share;
+};
+
 class Remainder {
  public:
   /// q is of samples by this guide. All references must outlive it.
@@ -43,6 +53,15 @@ class Remainder {
 
   /// The least tau.
   double tau() const { return tau_; }
+  void set_tau(double tau) { tau_ = tau; }
+  /// w of what a sample has found at the film point, `value` with balance weights.
+  double weight(const Vec2d& film, const Rgbd& value, const FoundPath& path) const {
+    return luminance(value) / (path.roulette * brightness_(film));
+  }
+  /// The path of that weight, if samples do not carry it whole: it may have no coordinates in the
+  /// phase space, or no remainder.
+  std::optional<BrightPath> bright_path(double weight, const FoundPath& path,
+                                        PhaseSpace phase_space) const;
   /// Of a path with light. A path so bright that sums might overflow, or whose density is not
   /// finite, has no remainder: samples carry it whole.
   Share share(const PathTopology& topology, const PathCoordinates& coordinates,
@@ -69,8 +88,7 @@ class RemainderChain {
       : remainder_(remainder), small_step_(scene, kernel), layers_(layers) {}
 
   /// The path that the next chains start from.
-  void start_at(const PathTopology& topology, const PathCoordinates& coordinates,
-                const Contribution& contribution, const Share& share);
+  void start_at(const BrightPath& path);
 
   /// Shows the probe, unless it is null, each state whose step is prepared from now on.
   void observe(GradientProbe* probe) { small_step_.observe(probe); }

@@ -18,21 +18,12 @@ void SampleFilm::add(std::size_t pixel, int layer, const Rgbd& value) {
   if (!layers_.empty()) layers_[static_cast<std::size_t>(layer) * sums_.size() + pixel] += value;
 }
 
-std::size_t SampleFilm::pixel_at(const Vec2d& film) const {
-  const int x =
-      std::clamp(static_cast<int>(film.x() * camera_.film_width), 0, camera_.film_width - 1);
-  const int y =
-      std::clamp(static_cast<int>(film.y() * camera_.film_height), 0, camera_.film_height - 1);
-  return static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_.film_width) +
-         static_cast<std::size_t>(x);
-}
-
 void SampleFilm::merge(std::size_t tasks) {
   for (std::size_t i = 0; i < tasks; ++i) {
     Task& task = tasks_[i];
     for (const Splat& splat : task.splats) {
       if (weights_.is_pixel()) {
-        add(pixel_at(splat.film), splat.layer, splat.value);
+        add(camera_.pixel(splat.film), splat.layer, splat.value);
         continue;
       }
       weights_.spread(splat.film, [&](std::size_t pixel, double weight) {

@@ -55,7 +55,6 @@ class SampleFilm {
   };
 
   void add(std::size_t pixel, int layer, const Rgbd& value);
-  std::size_t pixel_at(const Vec2d& film) const;
   /// Adds the splats of the first tasks.
   void merge(std::size_t tasks);
 

@@ -147,7 +147,7 @@ struct Splitter::Particles {
     ++figures_of(0).particles;
     const LobeSequence sequence(topology);
     const int steps = options.splitting.last_steps;
-    last.start_at(topology, coordinates, c, share);
+    last.start_at({topology, coordinates, c, share});
     last.run(static_cast<std::uint64_t>(steps), rng,
              [&](const Share& at, const Rgbd& color, double weight) {
                (*visit)(sequence, number, at, color, weight * deposit / steps);

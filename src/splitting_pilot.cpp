@@ -8,6 +8,8 @@
 #include <map>
 #include <utility>
 
+#include "chain_schedule.h"
+
 namespace driftlight {
 namespace {
 
@@ -25,12 +27,8 @@ constexpr double kWorth = 20.0;
 /// Least noise to be saved, in units of the squared brightness: that of the samples themselves is
 /// about 1. What is saved must also outweigh the time that splitting takes of the samples.
 constexpr double kLeastSaving = 0.05;
-/// Least deposit of a visit, in units of the brightness of a pixel's sample: below it more visits
-/// no longer pay. Most deposit of a particle.
-constexpr double kLeastDeposit = 0.2;
+/// Most deposit of a particle.
 constexpr double kMostDeposit = 64.0;
-/// What a step costs in samples of the scene.
-constexpr double kStepCost = 0.3;
 /// Fewest and most samples of the top level for each of the scene.
 constexpr double kFewest = 0.02;
 constexpr double kMost = 8.0;
@@ -67,19 +65,14 @@ struct Setup {
   const Splitter& splitter;
   const Camera& camera;
   std::uint64_t seed;
-
-  int pixel(const Vec2d& film) const {
-    return static_cast<int>(film.y() * camera.film_height) * camera.film_width +
-           static_cast<int>(film.x() * camera.film_width);
-  }
 };
 
 PilotRun run_task(const Setup& pilot, const SplittingPlan& plan, std::uint64_t first) {
   PilotRun result;
   Splitter splitter = pilot.splitter;
   std::map<LobeSequence, double> family;
-  std::map<int, double> pixels;
-  std::map<std::pair<int, int>, double> alone;  ///< by particle and pixel
+  std::map<std::size_t, double> pixels;
+  std::map<std::pair<int, std::size_t>, double> alone;  ///< by particle and pixel
   for (std::uint64_t i = first; i < first + kTask; ++i) {
     Rng rng(pilot.seed, Stream::SplittingPilot, i);
     const Vec2d film = rng.uniform2();
@@ -89,7 +82,7 @@ PilotRun run_task(const Setup& pilot, const SplittingPlan& plan, std::uint64_t f
     splitter.sample(
         film, plan, rng,
         [&](LobeSequence sequence, int particle, const Share& share, const Rgbd&, double amount) {
-          const int pixel = pilot.pixel(share.film);
+          const std::size_t pixel = pilot.camera.pixel(share.film);
           family[sequence] += amount;
           pixels[pixel] += amount;
           alone[{particle, pixel}] += amount;
@@ -144,7 +137,7 @@ double set_effort(const PilotRun& run, double samples, int last_steps, Splitting
   const double a = run.alone / (samples * plan.deposit);
   const double b = (run.pixels - run.alone) / samples;
   // Work per deposit does not depend on it.
-  const double work = kStepCost * run.steps * plan.deposit / samples;
+  const double work = kMutationCost * run.steps * plan.deposit / samples;
   const double best = a > 0.0 ? std::sqrt(b * work / a) : kMostDeposit;
   const double least = kLeastDeposit * last_steps;
   plan.deposit = std::clamp(best, least, std::max(least, kMostDeposit));

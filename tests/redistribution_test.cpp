@@ -12,6 +12,7 @@
 #include "remainder.h"
 #include "support/learned_guide.h"
 #include "support/test_scenes.h"
+#include "support/tiles.h"
 
 namespace driftlight::test {
 namespace {
@@ -95,8 +96,10 @@ TEST(BrightnessMap, IsOneWithoutLight) {
   EXPECT_EQ(map({0.5, 0.5}), 1.0);
 }
 
-LangevinResult render_small(const Scene& scene, int threads, double threshold) {
+LangevinResult render_small(const Scene& scene, int threads, std::optional<double> threshold,
+                            double scale = 0.32) {
   LangevinOptions options;
+  options.kernel.scale = scale;
   options.mode = Mode::Redistribution;
   options.max_depth = 6;
   options.redistribution.threshold = threshold;
@@ -116,6 +119,24 @@ TEST(Redistribution, DoesNotDependOnThreads) {
     EXPECT_EQ(one.statistics.mutations, other.statistics.mutations);
     EXPECT_EQ(one.statistics.small_step.accepted, other.statistics.small_step.accepted);
   }
+}
+
+TEST(Redistribution, ChosenThresholdDoesNotDependOnThreads) {
+  const Scene& scene = test_scenes().front().scene;
+  const LangevinResult one = render_small(scene, 1, std::nullopt);
+  const LangevinResult two = render_small(scene, 2, std::nullopt);
+  EXPECT_GE(one.statistics.threshold, 1.0);
+  EXPECT_EQ(one.statistics.threshold, two.statistics.threshold);
+  EXPECT_EQ(one.image.rgb, two.image.rgb);
+}
+
+// Law: where chains do not move there is nothing to gain by them.
+TEST(Redistribution, ChoosesAHighThresholdForChainsThatStay) {
+  const LoadedScene loaded = load_small("small_hole");
+  const LangevinResult moving = render_small(loaded.scene, 2, std::nullopt);
+  const LangevinResult stuck = render_small(loaded.scene, 2, std::nullopt, 1e6);
+  EXPECT_GE(stuck.statistics.threshold, 8.0);
+  EXPECT_LT(moving.statistics.threshold, stuck.statistics.threshold);
 }
 
 /// What no sample exceeds is carried by the samples alone.

@@ -75,8 +75,8 @@ enum class Mode {
 
 /// Of Mode::Redistribution.
 struct RedistributionOptions {
-  /// tau: samples keep so many times the brightness of the image around them.
-  double threshold = 1;
+  /// tau: samples keep so many times the brightness of the image around them. None: from a pilot.
+  std::optional<double> threshold = std::nullopt;
   /// Mutations of a chain.
   int chain_length = 100;
   /// Most mutations for each bidirectional sample, in the mean.

@@ -20,7 +20,8 @@ enum class Stream : std::uint64_t {
   Pixel,
   Test,
   GradientCheck,
-  SplittingPilot
+  SplittingPilot,
+  ThresholdPilot
 };
 
 /// Uniform numbers in (0, 1) from elsewhere than a generator.

@@ -118,6 +118,7 @@ struct LangevinStatistics {
   /// Of Mode::Redistribution: mean luminance that chains carry, and how many samples started any.
   double remainder = 0;
   std::uint64_t starts = 0;
+  double threshold = 0;  ///< tau
   double samples_per_pixel = 0;
   /// Of Mode::Splitting: from level 0, the scene itself, to the softest; empty if nothing was left
   /// to splitting.

@@ -2,6 +2,8 @@
 /// The sensor: a pinhole or an orthographic camera.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 
@@ -42,6 +44,13 @@ struct Camera {
   double area() const { return 4.0 * half_width * half_height; }
   double pixel_count() const {
     return static_cast<double>(film_width) * static_cast<double>(film_height);
+  }
+  /// Index of the pixel, row by row from the top, that the film point is in or nearest to.
+  std::size_t pixel(const Vec2d& film) const {
+    const int x = std::clamp(static_cast<int>(film.x() * film_width), 0, film_width - 1);
+    const int y = std::clamp(static_cast<int>(film.y() * film_height), 0, film_height - 1);
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(film_width) +
+           static_cast<std::size_t>(x);
   }
 
   /// The coordinate of the film point.

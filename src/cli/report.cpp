@@ -112,7 +112,9 @@ void report_redistribution(const std::string& integrator, const LangevinStatisti
   report.empty = !(s.samples_per_pixel > 0.0);
   report.statistics.update({{"samples_per_pixel", s.samples_per_pixel},
                             {"starts", s.starts},
-                            {"remainder", s.remainder}});
+                            {"remainder", s.remainder},
+                            {"threshold", s.threshold}});
+  report.details.push_back(fmt::format("threshold {:g}", s.threshold));
   report.summary = {
       fmt::format("{}: {} x {} pixels, {:.4g} samples and {:.4g} mutations per pixel in {:.2f} s",
                   integrator, image.width, image.height, s.samples_per_pixel,
