@@ -316,7 +316,7 @@ TEST_F(CompareCli, StudiesTheTermsOfTheStep) {
   for (const char* budget : {"out/equal_time", "out/equal_mutations"}) {
     EXPECT_EQ(files(budget).count("report.html"), 1U);
     const json all = results(budget);
-    ASSERT_EQ(all.at("integrators").size(), 24U);
+    ASSERT_EQ(all.at("integrators").size(), 22U);
     for (const json& integrator : all.at("integrators")) {
       EXPECT_TRUE(contains(outcome.out, integrator.at("name"))) << outcome.out;
       const json& options = integrator.at("options");
@@ -325,12 +325,12 @@ TEST_F(CompareCli, StudiesTheTermsOfTheStep) {
                    options.at("safety").dump() + options.at("time_step_cap").dump());
     }
   }
-  EXPECT_EQ(kinds.size(), 24U);
+  EXPECT_EQ(kinds.size(), 22U);
   const json by_work = results("out/equal_mutations");
   for (const json& integrator : by_work.at("integrators"))
     EXPECT_NEAR(integrator.at("moments").back().at("work").get<double>(), 4.0, 0.4);
   const std::string csv = read("out/terms.csv");
-  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 25);
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 23);
 }
 
 // --- Mistakes ------------------------------------------------------------------------------------

@@ -261,6 +261,16 @@ TEST(BsdfsXml, MapsMayBeNested) {
   EXPECT_NE(load_material(R"(<bsdf type="mask">)" + map + "</bsdf>").relief, nullptr);
 }
 
+TEST(BsdfsXml, NoticesWhatNormalMapsLeaveOut) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(
+      lit(R"(<shape type="rectangle"><bsdf type="normalmap"><texture type="checkerboard"/>
+             <boolean name="useShadowingFunction" value="true"/><bsdf type="diffuse"/></bsdf>
+             </shape>)"));
+  ASSERT_EQ(loaded.notices.size(), 1U);
+  EXPECT_NE(loaded.notices[0].find("face away"), std::string::npos);
+}
+
 // Law: a <ref> in a map may name its texture or its bsdf, in any order.
 TEST(BsdfsXml, MapsReferToTexturesAndBsdfs) {
   const SceneDirectory directory;

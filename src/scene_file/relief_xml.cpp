@@ -50,9 +50,13 @@ Surface read_bump_map(Properties& properties, LoadContext& context) {
 }
 
 Surface read_normal_map(Properties& properties, LoadContext& context) {
-  properties.ignore({"flipInvalidNormals"});  // they are
-  if (properties.boolean("useShadowingFunction", false))
-    context.notice(properties.element(), "the shadowing function of normal maps is left out");
+  // Of newer versions of Mitsuba 3.
+  const bool flips = properties.boolean("flipInvalidNormals", false);
+  const bool shadows = properties.boolean("useShadowingFunction", false);
+  if (flips || shadows)
+    context.notice(
+        properties.element(),
+        "normals that face away from the viewer are black, neither flipped nor shadowed");
   return read_relief(properties, context, {Relief::Kind::Normals, {}, 1.0});
 }
 
