@@ -22,9 +22,9 @@ struct Term {
 const std::array<Term, 4>& preconditioners() {
   static const std::array<Term, 4> terms{
       {{"identity", {{"preconditioner", "identity"}, {"scale", "0.012"}}},
-       {"diagonal", {{"preconditioner", "diagonal"}}},
+       {"diagonal", {{"preconditioner", "diagonal"}, {"scale", "3"}}},
        {"constraints", {{"preconditioner", "constraints"}}},
-       {"hessian", {{"preconditioner", "hessian"}}}}};
+       {"hessian", {{"preconditioner", "hessian"}, {"scale", "0.1"}}}}};
   return terms;
 }
 

@@ -46,8 +46,7 @@ class SceneLoader {
     if (context_.shape_count == 0) root.fail("the scene has no shape");
     if (!has_emitter_) root.fail("the scene has no emitter");
     Scene scene = with_location(root, [&] { return context_.builder.build(); });
-    return {std::move(scene), max_depth_, std::move(context_.notices),
-            context_.tone_mapping};
+    return {std::move(scene), max_depth_, std::move(context_.notices), context_.tone_mapping};
   }
 
  private:
