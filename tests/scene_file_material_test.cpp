@@ -19,10 +19,15 @@ using test::with_sensor;
 
 constexpr double kAir = 1.000277;
 
+/// A scene of one shape with this bsdf.
+LoadedScene load_shape(const std::string& type, const std::string& bsdf) {
+  const SceneDirectory directory;
+  return directory.load(lit("<shape type=\"" + type + "\">" + bsdf + "</shape>"));
+}
+
 /// The BSDF of the only shape.
 Bsdf load_bsdf(const std::string& bsdf) {
-  const SceneDirectory directory;
-  const LoadedScene loaded = directory.load(lit("<shape type=\"sphere\">" + bsdf + "</shape>"));
+  const LoadedScene loaded = load_shape("sphere", bsdf);
   EXPECT_EQ(loaded.scene.bsdfs().size(), 1U);
   return loaded.scene.bsdfs()[0];
 }
@@ -232,8 +237,7 @@ TEST(BsdfsXml, MixturesAreWeightedSums) {
 
 /// The material of the only shape, a rectangle.
 Material load_material(const std::string& bsdf) {
-  const SceneDirectory directory;
-  const LoadedScene loaded = directory.load(lit("<shape type=\"rectangle\">" + bsdf + "</shape>"));
+  const LoadedScene loaded = load_shape("rectangle", bsdf);
   EXPECT_EQ(loaded.scene.materials().size(), 1U);
   return loaded.scene.materials()[0];
 }
