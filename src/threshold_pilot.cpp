@@ -17,11 +17,11 @@ namespace driftlight {
 namespace {
 
 constexpr std::uint64_t kTask = 64;
-/// Samples that tell how much they leave, and those that follow chains.
-constexpr std::uint64_t kFirstSamples = 4096;
-constexpr std::uint64_t kSamples = 16384;
-/// Chains that are followed, in the mean.
-constexpr double kChains = 1024;
+/// Samples of the pilot before for each that follows chains; of these for each that first tells how
+/// much samples leave.
+constexpr std::uint64_t kFewer = 4;
+/// Starts of chains that are followed, in the mean, over samples.
+constexpr double kStarts = 1.0 / 16.0;
 constexpr std::array<double, 8> kThresholds{kLeastThreshold, 2, 4, 8, 16, 64, 256, 1024};
 
 /// A path that is brighter than the least threshold.
@@ -173,9 +173,9 @@ double cost_of(const std::vector<Sample>& samples, double tau,
 double choose_threshold(const Scene& scene, const LangevinOptions& options, const Pilot& pilot,
                         const Remainder& remainder, const SplittingShare& splitting,
                         std::uint64_t seed) {
-  const auto run = [&](std::uint64_t first, std::uint64_t count, double light) {
-    std::vector<Sample> samples(count);
-    tbb::parallel_for(std::uint64_t{0}, count / kTask, [&](std::uint64_t task) {
+  const auto run = [&](std::uint64_t first, std::uint64_t number, double light) {
+    std::vector<Sample> samples(number);
+    tbb::parallel_for(std::uint64_t{0}, number / kTask, [&](std::uint64_t task) {
       Sampler sampler(scene, options, pilot, remainder, splitting, light);
       for (std::uint64_t i = task * kTask; i < (task + 1) * kTask; ++i) {
         Rng rng(seed, Stream::ThresholdPilot, first + i);
@@ -184,13 +184,19 @@ double choose_threshold(const Scene& scene, const LangevinOptions& options, cons
     });
     return samples;
   };
+  const auto whole_tasks = [](std::uint64_t number) {
+    return std::max<std::uint64_t>(1, number / kTask) * kTask;
+  };
+  const std::uint64_t count =
+      whole_tasks(static_cast<std::uint64_t>(options.redistribution.pilot) / kFewer);
+  const std::uint64_t first_count = whole_tasks(count / kFewer);
   double left = 0.0;
-  for (const Sample& sample : run(0, kFirstSamples, kInfinity))
+  for (const Sample& sample : run(0, first_count, kInfinity))
     for (const std::vector<Bright>* paths : {&sample.own, &sample.splat})
       for (const Bright& bright : *paths) left += bright.left(kLeastThreshold);
-  const double expected = left / static_cast<double>(kFirstSamples) * static_cast<double>(kSamples);
-  if (!(expected > 0.0)) return kLeastThreshold;
-  const std::vector<Sample> samples = run(kFirstSamples, kSamples, expected / kChains);
+  if (!(left > 0.0)) return kLeastThreshold;
+  const std::vector<Sample> samples =
+      run(first_count, count, left / static_cast<double>(first_count) / kStarts);
   return *std::min_element(kThresholds.begin(), kThresholds.end(), [&](double a, double b) {
     return cost_of(samples, a, options.redistribution) <
            cost_of(samples, b, options.redistribution);

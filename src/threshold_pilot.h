@@ -24,6 +24,7 @@ inline constexpr double kLeastThreshold = 1.0;
 /// C the cost of a mutation. Where chains mix slowly, or samples leave something in so many places
 /// that the light of a chain is far more than what it starts from, a higher tau is better.
 ///
+/// Takes a fourth of the samples of `options.redistribution.pilot`, and a sixteenth.
 /// `remainder` has kLeastThreshold; what `splitting` takes does not start chains.
 double choose_threshold(const Scene& scene, const LangevinOptions& options, const Pilot& pilot,
                         const Remainder& remainder, const SplittingShare& splitting,
