@@ -214,17 +214,26 @@ std::vector<OptionEntry> entries(PrimaryOptions& options) {
   };
 }
 
+std::vector<OptionEntry> entries(MmltOptions& options) {
+  std::vector<OptionEntry> result = entries(static_cast<PrimaryOptions&>(options));
+  result.insert(
+      result.begin() + 1,
+      choice("large_steps", options.large_steps, std::array<std::string_view, 2>{"one", "all"},
+             "proposals drawn anew: of one strategy, or a whole bidirectional sample, of "
+             "which one path goes on"));
+  return result;
+}
+
 namespace {
 
-/// Those of MMLT, and behind the first `more`.
+/// Those of MMLT, and behind the first two `more`.
 std::vector<OptionEntry> gaussian_step_entries(GaussianStepOptions& options,
                                                std::vector<OptionEntry> more) {
-  std::vector<OptionEntry> result = entries(static_cast<PrimaryOptions&>(options));
+  std::vector<OptionEntry> result = entries(static_cast<MmltOptions&>(options));
   more.insert(more.begin(),
               number("isotropic_probability", options.isotropic_probability, Range<double>{0, 1},
-                     "share of the small steps that are those of mmlt, which alone change the "
-                     "strategy"));
-  result.insert(result.begin() + 1, more.begin(), more.end());
+                     "share of the small steps that are those of mmlt"));
+  result.insert(result.begin() + 2, more.begin(), more.end());
   return result;
 }
 
@@ -326,6 +335,12 @@ void PrimaryOptions::validate() const {
   PrimaryOptions copy = *this;
   check(entries(copy));
   check_steps(step_min, step_max);
+}
+
+void MmltOptions::validate() const {
+  PrimaryOptions::validate();
+  MmltOptions copy = *this;
+  check(entries(copy));
 }
 
 void H2mcOptions::validate() const {

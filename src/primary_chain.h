@@ -21,7 +21,6 @@ class PrimaryChain {
   void flush() { deposits_.flush(); }
 
   const LangevinStatistics& statistics() const { return statistics_; }
-  int edges() const { return point_.edges; }
   /// I at all large steps proposed so far: independent estimates of its integral.
   const RunningMean& weights() const { return weights_; }
 

@@ -40,6 +40,17 @@ class PrimaryDeposits {
     return false;
   }
 
+  /// Likewise where `proposed` is a path drawn out of a sample in proportion to its light: for what
+  /// might have been drawn the whole sample takes the proposal's weight.
+  bool settle(const PrimaryPlace& sample, double acceptance, Rng& rng) {
+    if (acceptance > 0.0) splat(sample, acceptance);
+    gathered_ += 1.0 - acceptance;
+    if (!(rng.uniform() < acceptance)) return false;
+    flush();
+    std::swap(current, proposed);
+    return true;
+  }
+
   /// Deposits what the current place has gathered since it was entered.
   void flush() {
     if (gathered_ > 0.0) splat(current, gathered_);

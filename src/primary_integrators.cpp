@@ -11,14 +11,12 @@
 
 #include "chain_run.h"
 #include "driftlight/render.h"
-#include "gaussian_chain.h"
 #include "primary_chain.h"
+#include "strategy_chain.h"
 #include "systematic_resampling.h"
 
 namespace driftlight {
 namespace {
-
-using Strategies = PrimaryTarget::Strategies;
 
 /// Points of PrimaryTarget, and chains of them.
 class PointSampler {
@@ -29,10 +27,8 @@ class PointSampler {
   PointSampler(const PrimaryTarget& target, const PrimaryOptions& options)
       : target_(target), options_(options) {}
 
-  Point point(std::uint64_t seed, std::size_t i, int edges) const {
-    Point result(options_, seed, Stream::Bootstrap, i);
-    result.edges = edges;
-    return result;
+  Point point(std::uint64_t seed, std::size_t i, int /*edges*/) const {
+    return {options_, seed, Stream::Bootstrap, i};
   }
   double target(Point& point) { return target_(point, splats_); }
   std::unique_ptr<Chain> chain(const Point& start, Film& film, const Rng& rng) const {
@@ -49,18 +45,23 @@ class PointSampler {
 class NumbersSampler {
  public:
   using Point = StrategyNumbers;
-  using Chain = GaussianChain;
+  using Chain = StrategyChain;
 
-  NumbersSampler(const StrategyTarget& target, const GaussianMethod& method)
+  NumbersSampler(const StrategyTarget& target, const StrategyMethod& method)
       : target_(target), method_(method) {}
 
   static Point point(std::uint64_t seed, std::size_t i, int edges) {
     Rng rng(seed, Stream::Bootstrap, i);
     return {edges, rng};
   }
-  double target(Point& point) {
-    target_(point, place_);
-    return place_.target;
+  double target(const Point& point) {
+    if (common_options(method_).large_steps == StrategyLargeSteps::All) {
+      Rng any(0, Stream::Bootstrap, 0);
+      target_.sample(point, any, place_);
+      return place_.target;
+    }
+    target_(point, point.strategy(), place_);
+    return (point.edges() + 1) * place_.target;
   }
   std::unique_ptr<Chain> chain(const Point& start, Film& film, const Rng& rng) const {
     return std::make_unique<Chain>(target_, method_, film, start, rng);
@@ -68,9 +69,12 @@ class NumbersSampler {
 
  private:
   StrategyTarget target_;
-  const GaussianMethod& method_;
+  const StrategyMethod& method_;
   PrimaryPlace place_;
 };
+
+/// Whether each chain has paths of one length, of which all then have their own integrals.
+enum class Lengths { Together, Apart };
 
 /// The chains with what they are started from.
 template <class Sampler>
@@ -79,17 +83,14 @@ class PrimaryChains {
   using Chain = typename Sampler::Chain;
 
   /// No chains if paths of `min_edges` and more carry no light.
-  PrimaryChains(const Sampler& sampler, const PrimaryOptions& options, Strategies strategies,
+  PrimaryChains(const Sampler& sampler, const PrimaryOptions& options, Lengths lengths,
                 int min_edges, std::uint64_t seed, Film& film)
       : sampler_(sampler),
         options_(options),
         seed_(seed),
-        strategies_(strategies),
-        min_edges_(min_edges) {
+        first_length_(lengths == Lengths::Apart ? min_edges : options.max_depth) {
     if (min_edges > options.max_depth) return;
-    bootstrap_weights_.resize(strategies == Strategies::One
-                                  ? static_cast<std::size_t>(options.max_depth - min_edges) + 1
-                                  : 1);
+    bootstrap_weights_.resize(static_cast<std::size_t>(options.max_depth - first_length_) + 1);
     const std::vector<double> values = bootstrap();
     for (std::size_t i = 0; i < values.size(); ++i)
       bootstrap_weights_[i % bootstrap_weights_.size()].add(values[i]);
@@ -131,14 +132,16 @@ class PrimaryChains {
     return sum;
   }
   std::size_t length_index(const Chain& chain) const {
-    return strategies_ == Strategies::One ? static_cast<std::size_t>(chain.edges() - min_edges_)
-                                          : 0;
+    if constexpr (requires { chain.edges(); })
+      return static_cast<std::size_t>(chain.edges() - first_length_);
+    else
+      return 0;
   }
 
   /// Sample i of the bootstrap, whose lengths take turns.
   typename Sampler::Point point(std::size_t i) const {
     const int turn = static_cast<int>(i % bootstrap_weights_.size());
-    return sampler_.point(seed_, i, strategies_ == Strategies::One ? min_edges_ + turn : 0);
+    return sampler_.point(seed_, i, first_length_ + turn);
   }
 
   /// The target at as many samples of each length.
@@ -160,8 +163,7 @@ class PrimaryChains {
   Sampler sampler_;
   const PrimaryOptions& options_;
   std::uint64_t seed_;
-  Strategies strategies_;
-  int min_edges_;
+  int first_length_;                            ///< of those apart; else the longest path
   std::vector<RunningMean> bootstrap_weights_;  ///< of each length, if they are apart
 };
 
@@ -169,39 +171,29 @@ class PrimaryChains {
 template <class SamplerOf>
 LangevinResult render_primary(const Scene& scene, const PrimaryOptions& options,
                               const RenderOptions& render, double mutations_per_pixel,
-                              Strategies strategies, const SamplerOf& sampler_of) {
+                              Lengths lengths, const SamplerOf& sampler_of) {
   tbb::task_arena arena(render.threads > 0 ? render.threads : tbb::task_arena::automatic);
   return arena.execute([&] {
     return run_chains(
         scene, options.direct, options.max_depth, render, mutations_per_pixel,
         [&](int min_edges, Film& film) {
-          return PrimaryChains(sampler_of(min_edges), options, strategies, min_edges, render.seed,
+          return PrimaryChains(sampler_of(min_edges), options, lengths, min_edges, render.seed,
                                film);
         },
         [](const auto&, LangevinResult&) {});
   });
 }
 
-LangevinResult render_points(const Scene& scene, const PrimaryOptions& options,
-                             const RenderOptions& render, double mutations_per_pixel,
-                             Strategies strategies) {
-  options.validate();
-  const EmissionGuide unguided(scene);
-  return render_primary(
-      scene, options, render, mutations_per_pixel, strategies, [&](int min_edges) {
-        return PointSampler(
-            PrimaryTarget(scene, unguided, strategies, min_edges, options.max_depth), options);
-      });
-}
-
 template <class Options>
-LangevinResult render_by_gaussian_steps(const Scene& scene, const Options& options,
-                                        const RenderOptions& render, double mutations_per_pixel) {
+LangevinResult render_by_strategies(const Scene& scene, const Options& options,
+                                    const RenderOptions& render, double mutations_per_pixel) {
   options.validate();
   const EmissionGuide unguided(scene);
-  const GaussianMethod method = options;
-  return render_primary(scene, options, render, mutations_per_pixel, Strategies::One, [&](int) {
-    return NumbersSampler(StrategyTarget(scene, unguided, options.max_depth), method);
+  const StrategyMethod method = options;
+  const Lengths lengths =
+      options.large_steps == StrategyLargeSteps::One ? Lengths::Apart : Lengths::Together;
+  return render_primary(scene, options, render, mutations_per_pixel, lengths, [&](int min_edges) {
+    return NumbersSampler(StrategyTarget(scene, unguided, min_edges, options.max_depth), method);
   });
 }
 
@@ -209,22 +201,27 @@ LangevinResult render_by_gaussian_steps(const Scene& scene, const Options& optio
 
 LangevinResult render_pssmlt(const Scene& scene, const PssmltOptions& options,
                              const RenderOptions& render, double mutations_per_pixel) {
-  return render_points(scene, options, render, mutations_per_pixel, Strategies::All);
+  options.validate();
+  const EmissionGuide unguided(scene);
+  return render_primary(
+      scene, options, render, mutations_per_pixel, Lengths::Together, [&](int min_edges) {
+        return PointSampler(PrimaryTarget(scene, unguided, min_edges, options.max_depth), options);
+      });
 }
 
 LangevinResult render_mmlt(const Scene& scene, const MmltOptions& options,
                            const RenderOptions& render, double mutations_per_pixel) {
-  return render_points(scene, options, render, mutations_per_pixel, Strategies::One);
+  return render_by_strategies(scene, options, render, mutations_per_pixel);
 }
 
 LangevinResult render_h2mc(const Scene& scene, const H2mcOptions& options,
                            const RenderOptions& render, double mutations_per_pixel) {
-  return render_by_gaussian_steps(scene, options, render, mutations_per_pixel);
+  return render_by_strategies(scene, options, render, mutations_per_pixel);
 }
 
 LangevinResult render_lmc(const Scene& scene, const LmcOptions& options,
                           const RenderOptions& render, double mutations_per_pixel) {
-  return render_by_gaussian_steps(scene, options, render, mutations_per_pixel);
+  return render_by_strategies(scene, options, render, mutations_per_pixel);
 }
 
 }  // namespace driftlight

@@ -44,6 +44,7 @@ class PrimaryBlocks {
     return scattered(x, light_offset() + 4 + 2 * from_light, numbers_.light_lobe(from_light));
   }
   const Vec3<T>& emitter_normal() const { return ray_.from.n; }
+  const Vec2<T>& emitter_uv() const { return ray_.from.uv; }
 
  private:
   /// Numbers of the subpath from the sensor.
@@ -213,12 +214,26 @@ void StrategyNumbers::move(const PrimaryOptions& options, Rng& rng) {
   }
 }
 
+void StrategyNumbers::move_within(const Strategy& strategy, const PrimaryOptions& options,
+                                  Rng& rng) {
+  const auto move_range = [&](int first, int size) {
+    for (int i = first; i < first + size; ++i) {
+      double& u = numbers_[static_cast<std::size_t>(i)];
+      u = moved(u, options, rng);
+    }
+  };
+  const auto [s, t] = strategy;
+  if (t > 1) move_range(kSensor, 2 + 3 * (t - 2));
+  if (s > 1) move_range(light_begin(), 5 + 3 * (s - 2));
+  if (s == 1) move_range(connection_begin(), kConnection);
+}
+
 void StrategyNumbers::move_choices(const Strategy& strategy, const PrimaryOptions& options,
                                    Rng& rng) {
   const StrategyNumbers before = *this;
-  move(options, rng);
-  numbers_[0] = before.numbers_[0];
-  for (int i = 0; i < dimension(edges_); ++i) steering(strategy, i) = before.steering(strategy, i);
+  move_within(strategy, options, rng);
+  for (int i = 0; i < dimension(strategy.edges()); ++i)
+    steering(strategy, i) = before.steering(strategy, i);
 }
 
 // ---- PrimaryPath ----------------------------------------------------------------------------
@@ -227,26 +242,28 @@ PrimaryPath primary_path(const Scene& scene, const FoundPath& found) {
   PrimaryPath path{{found.s, found.t}, {}};
   PathTopology& topology = path.topology;
   topology.emitter = found.end.emitter;
-  const auto add = [&](const SubpathVertex& x, const Vec3d& onward) {
+  const auto add = [&](const SubpathVertex& x, const Vec3d& onward, bool connects) {
     PathVertex& vertex = topology.vertices[topology.scatter_count++];
     vertex.hit = x.surface.hit;
-    vertex.delta = x.delta;
+    vertex.delta = x.delta && !connects;
     vertex.scattering = x.surface.side(onward);
   };
   topology.end = end_of(scene.emitters()[topology.emitter], found.s);
   const int from_sensor = found.s == 0 ? found.t - 2 : found.t - 1;
-  // Where the last vertex scatters to does not matter: it is no delta vertex, or is left for the
-  // environment.
+  // The subpaths of the sample may go on, and have left a vertex that connects by a delta lobe.
+  // Where such a vertex scatters to does not matter.
   for (int i = 0; i < from_sensor; ++i) {
     const SubpathVertex& x = found.from_sensor[i];
     const bool last = i + 1 == found.from_sensor.size();
-    add(x, last ? found.end.p : Vec3d(-found.from_sensor[i + 1].surface.wi));
+    add(x, last ? found.end.p : Vec3d(-found.from_sensor[i + 1].surface.wi),
+        found.s > 0 && i + 1 == from_sensor);
   }
   if (topology.end == PathEnd::Hit)
     topology.vertices[topology.scatter_count].hit = found.from_sensor[from_sensor].surface.hit;
   for (int i = found.s - 2; i >= 0; --i) {
     const SubpathVertex& x = found.from_light[i];
-    add(x, i == found.s - 2 ? x.surface.wi : Vec3d(-found.from_light[i + 1].surface.wi));
+    const bool last = i == found.s - 2;
+    add(x, last ? x.surface.wi : Vec3d(-found.from_light[i + 1].surface.wi), last);
     ++topology.light_count;
   }
   topology.block_count = static_cast<std::uint8_t>(count_blocks(topology, found.s));

@@ -34,7 +34,7 @@ struct Strategy {
   bool operator==(const Strategy&) const = default;
 };
 
-/// All numbers that strategies of paths of so many edges may ask for.
+/// All numbers that strategies of paths of so many edges, or fewer, may ask for.
 class StrategyNumbers {
  public:
   /// Numbers that steer a path.
@@ -45,6 +45,7 @@ class StrategyNumbers {
   StrategyNumbers(int edges, Rng& rng);
 
   int edges() const { return edges_; }
+  /// Of so many edges, chosen by a number of its own.
   Strategy strategy() const;
   /// Number i of those that steer a path of the strategy, in the order above.
   double& steering(const Strategy& strategy, int i) { return numbers_[index(strategy, i)]; }
@@ -54,31 +55,41 @@ class StrategyNumbers {
   double light_lobe(int i) const { return at(light_begin() + 7 + 3 * i); }
   /// Moves all of them as PrimarySample does.
   void move(const PrimaryOptions& options, Rng& rng);
-  /// Moves all but those that steer a path of the strategy, and that which chooses it.
+  /// Moves those that a path of the strategy is drawn from; that which chooses it remains.
+  void move_within(const Strategy& strategy, const PrimaryOptions& options, Rng& rng);
+  /// Moves those of them that do not steer the path.
   void move_choices(const Strategy& strategy, const PrimaryOptions& options, Rng& rng);
 
-  /// Hands out numbers from a first one on.
+  /// Hands out numbers from a first one on; the first `period` of them again and again, if there is
+  /// one.
   class Reader final : public UniformSource {
    public:
-    explicit Reader(const double* first) : next_(first) {}
-    double next() override { return *next_++; }
+    explicit Reader(const double* first, int period = 0) : first_(first), period_(period) {}
+    double next() override {
+      if (period_ > 0 && next_ == period_) next_ = 0;
+      return first_[next_++];
+    }
 
    private:
-    const double* next_;
+    const double* first_;
+    int period_;
+    int next_ = 0;
   };
   /// Those of the sensor's subpath, of the light's, and of the connection.
   Reader sensor() const { return Reader(&at(kSensor)); }
   Reader light() const { return Reader(&at(light_begin())); }
-  Reader connection() const { return Reader(&at(connection_begin())); }
+  /// All connections to emitters are to the same point.
+  Reader connection() const { return Reader(&at(connection_begin()), kConnection); }
 
  private:
   // Places of the numbers: the strategy; the film, then three for each vertex; the emitter and the
   // ray, then likewise; the emitter and the point.
   static constexpr int kSensor = 1;
+  static constexpr int kConnection = 3;  ///< of a connection
   static constexpr int kMaxCount = 1 + 7 + 6 * kMaxPathLength + 3;
   int light_begin() const { return kSensor + 2 + 3 * edges_; }
   int connection_begin() const { return light_begin() + 5 + 3 * edges_; }
-  int count() const { return connection_begin() + 3; }
+  int count() const { return connection_begin() + kConnection; }
 
   const double& at(int i) const { return numbers_[static_cast<std::size_t>(i)]; }
   std::size_t index(const Strategy& strategy, int i) const;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "primary_target.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace driftlight {
@@ -11,7 +10,6 @@ struct Sink {
   std::vector<PrimarySplat>& splats;
   Vec2d film;
   int min_edges;
-  double factor;
   std::uint64_t& non_finite;
 
   void add(const Rgbd& value, const FoundPath& path) { splat(film, value, path); }
@@ -23,7 +21,7 @@ struct Sink {
       ++non_finite;
       return;
     }
-    splats.push_back({at, value / y, factor * y});
+    splats.push_back({at, value / y, y});
   }
 };
 
@@ -31,17 +29,13 @@ struct Sink {
 
 PrimaryPoint::PrimaryPoint(const PrimaryOptions& options, std::uint64_t seed, Stream purpose,
                            std::uint64_t index)
-    : sensor(options, Rng(seed, purpose, 4 * index)),
-      light(options, Rng(seed, purpose, 4 * index + 1)),
-      connection(options, Rng(seed, purpose, 4 * index + 2)),
-      strategy(options, Rng(seed, purpose, 4 * index + 3)) {}
+    : sensor(options, Rng(seed, purpose, 3 * index)),
+      light(options, Rng(seed, purpose, 3 * index + 1)),
+      connection(options, Rng(seed, purpose, 3 * index + 2)) {}
 
-PrimaryTarget::PrimaryTarget(const Scene& scene, const EmissionGuide& unguided,
-                             Strategies strategies, int min_edges, int max_edges)
-    : tracer_(scene, unguided, MisHeuristic::Balance, max_edges,
-              strategies == Strategies::All ? Roulette::On : Roulette::Off),
-      strategies_(strategies),
-      min_edges_(min_edges) {}
+PrimaryTarget::PrimaryTarget(const Scene& scene, const EmissionGuide& unguided, int min_edges,
+                             int max_edges)
+    : tracer_(scene, unguided, MisHeuristic::Balance, max_edges), min_edges_(min_edges) {}
 
 double PrimaryTarget::operator()(PrimaryPoint& point, std::vector<PrimarySplat>& splats) {
   splats.clear();
@@ -50,15 +44,8 @@ double PrimaryTarget::operator()(PrimaryPoint& point, std::vector<PrimarySplat>&
   Rng connection(point.connection);
   const SampleNumbers numbers{sensor, light, connection};
   const Vec2d film = sensor.uniform2();
-  if (strategies_ == Strategies::All) {
-    Sink sink{splats, film, min_edges_, 1.0, non_finite_};
-    tracer_.sample(film, numbers, sink);
-  } else {
-    const int count = point.edges + 1;
-    const int s = std::min(static_cast<int>(count * point.strategy.next()), point.edges);
-    Sink sink{splats, film, min_edges_, static_cast<double>(count), non_finite_};
-    tracer_.sample_strategy(s, count - s, film, numbers, sink);
-  }
+  Sink sink{splats, film, min_edges_, non_finite_};
+  tracer_.sample(film, numbers, sink);
   double sum = 0.0;
   for (const PrimarySplat& splat : splats) sum += splat.luminance;
   return sum;

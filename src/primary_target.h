@@ -18,8 +18,6 @@ struct PrimaryPoint {
   PrimarySample sensor;  ///< film coordinates first
   PrimarySample light;
   PrimarySample connection;
-  PrimarySample strategy;  ///< one number, if only one strategy is used
-  int edges = 0;           ///< length of its paths, if only one strategy is used
 
   /// A point drawn at random, as sample `index` of a purpose.
   PrimaryPoint(const PrimaryOptions& options, std::uint64_t seed, Stream purpose,
@@ -28,7 +26,7 @@ struct PrimaryPoint {
   /// Does something to all of its numbers.
   template <class Action>
   void each(const Action& action) {
-    for (PrimarySample* part : {&sensor, &light, &connection, &strategy}) action(*part);
+    for (PrimarySample* part : {&sensor, &light, &connection}) action(*part);
   }
 };
 
@@ -39,18 +37,13 @@ struct PrimarySplat {
   double luminance;  ///< positive and finite
 };
 
-/// I = sum of the luminances of what a bidirectional sample finds, as a function of its numbers.
-/// Its integral over them is that of the path contribution over the film.
+/// I = sum of the luminances of what a bidirectional sample finds, of paths from `min_edges` to
+/// `max_edges` edges, as a function of its numbers (Kelemen et al. 2002, with bidirectional path
+/// tracing). Its integral over them is that of the path contribution over the film.
 class PrimaryTarget {
  public:
-  /// Strategies that a sample tries: all of them, and its lengths are those from `min_edges` to
-  /// `max_edges` (Kelemen et al. 2002, with bidirectional path tracing); or one of the n + 1 of the
-  /// point's length n, times n + 1 (Hachisuka et al. 2014).
-  enum class Strategies { All, One };
-
   /// The guide must outlive it. Copies share nothing but references.
-  PrimaryTarget(const Scene& scene, const EmissionGuide& unguided, Strategies strategies,
-                int min_edges, int max_edges);
+  PrimaryTarget(const Scene& scene, const EmissionGuide& unguided, int min_edges, int max_edges);
 
   /// I; what the point puts on the film, in place of what `splats` held. Values that are not finite
   /// are no light, and counted.
@@ -61,7 +54,6 @@ class PrimaryTarget {
 
  private:
   BidirectionalTracer tracer_;
-  Strategies strategies_;
   int min_edges_;
   std::uint64_t non_finite_ = 0;
 };

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The target of PrimaryTarget::Strategies::One as a function of StrategyNumbers, with the path
-/// that it has found.
+/// The light of one strategy's path as a function of StrategyNumbers, and that of all.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <utility>
@@ -14,12 +14,23 @@ namespace driftlight {
 
 class StrategyTarget {
  public:
-  /// The guide must outlive it. Copies share nothing but references.
-  StrategyTarget(const Scene& scene, const EmissionGuide& unguided, int max_edges);
+  /// Of paths from `min_edges` to `max_edges` edges. The guide must outlive it. Copies share
+  /// nothing but references.
+  StrategyTarget(const Scene& scene, const EmissionGuide& unguided, int min_edges, int max_edges);
 
-  /// I, and what it puts on the film in place of what was there; the path, if it carries light.
-  /// Values that are not finite are no light, and counted.
-  std::optional<PrimaryPath> operator()(const StrategyNumbers& numbers, PrimaryPlace& place);
+  /// I_st of the strategy, and what it puts on the film in place of what was there; the path, if it
+  /// carries light. Values that are not finite are no light, and counted.
+  std::optional<PrimaryPath> operator()(const StrategyNumbers& numbers, const Strategy& strategy,
+                                        PrimaryPlace& place);
+
+  /// A path out of a bidirectional sample.
+  struct Choice {
+    PrimaryPath path;
+    std::size_t splat;  ///< what it puts on the film
+  };
+  /// The sum of I_st over all strategies, and what all of them put on the film; one of their paths,
+  /// drawn in proportion to I_st.
+  std::optional<Choice> sample(const StrategyNumbers& numbers, Rng& rng, PrimaryPlace& place);
 
   const PrimaryFunction& function() const { return function_; }
   /// Since they were last taken.
@@ -29,6 +40,7 @@ class StrategyTarget {
   const Scene& scene_;
   BidirectionalTracer tracer_;
   PrimaryFunction function_;
+  int min_edges_;
   std::uint64_t non_finite_ = 0;
 };
 

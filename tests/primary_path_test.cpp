@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 #include <string>
 #include <vector>
@@ -30,7 +31,7 @@ struct Found {
 /// Points that carry light, at paths of 1 to 6 edges, at most `count` of each strategy.
 std::vector<Found> found_paths(const Scene& scene, int count, int tries, std::uint64_t seed) {
   const EmissionGuide unguided(scene);
-  StrategyTarget target(scene, unguided, 6);
+  StrategyTarget target(scene, unguided, 1, 6);
   PrimaryPlace place;
   std::map<std::pair<int, int>, int> counts;
   std::vector<Found> result;
@@ -39,7 +40,7 @@ std::vector<Found> found_paths(const Scene& scene, int count, int tries, std::ui
     const StrategyNumbers numbers(1 + static_cast<int>(i % 6), rng);
     const auto [s, t] = numbers.strategy();
     if (counts[{s, t}] >= count) continue;
-    const auto path = target(numbers, place);
+    const auto path = target(numbers, numbers.strategy(), place);
     if (!path) continue;
     ++counts[{s, t}];
     result.push_back({numbers, *path, place.target});
@@ -58,7 +59,7 @@ TEST(PrimaryPath, WalkHasTheTargetOfTheTracer) {
     int count = 0;
     for (const Found& found : found_paths(test.scene, 12, 6000, 11)) {
       const auto [s, t] = found.path.strategy;
-      const double expected = std::log(found.target / (s + t));
+      const double expected = std::log(found.target);
       const double y = function.log_target(found.numbers, found.path);
       EXPECT_NEAR(y, expected, 1e-6 * (1.0 + std::abs(expected))) << test.name << s << ' ' << t;
       strategies.emplace(s, t);
@@ -70,6 +71,53 @@ TEST(PrimaryPath, WalkHasTheTargetOfTheTracer) {
   }
   // Each way to end; an environment also with a light side.
   EXPECT_EQ(ends.size(), 9U);
+}
+
+/// Law: a sample brings what its strategies bring one by one, and the path drawn from it is that of
+/// its strategy, as often as its share is. Paths may be shorter than what the numbers have room
+/// for.
+TEST(PrimaryPath, SampleIsTheSumOfItsStrategies) {
+  for (const TestScene& test : test_scenes()) {
+    const EmissionGuide unguided(test.scene);
+    StrategyTarget target(test.scene, unguided, 2, 6);
+    PrimaryPlace sample;
+    PrimaryPlace place;
+    double surprise = 0;
+    int count = 0;
+    for (std::uint64_t i = 0; i < 1500; ++i) {
+      Rng rng(17, Stream::Test, i);
+      const StrategyNumbers numbers(6, rng);
+      const auto choice = target.sample(numbers, rng, sample);
+      std::vector<double> parts;
+      double chosen = 0;
+      for (int edges = 2; edges <= 6; ++edges) {
+        for (int s = 0; s <= edges; ++s) {
+          const Strategy strategy{s, edges + 1 - s};
+          const auto path = target(numbers, strategy, place);
+          parts.push_back(place.target);
+          if (!choice || choice->path.strategy != strategy) continue;
+          ASSERT_TRUE(path) << test.name;
+          chosen = place.target;
+          EXPECT_NEAR(chosen, sample.splats[choice->splat].luminance, 1e-9 * chosen);
+          EXPECT_EQ(path->topology.block_count, choice->path.topology.block_count);
+          for (int k = 0; k < path->topology.scatter_count; ++k) {
+            const auto at = static_cast<std::size_t>(k);
+            EXPECT_EQ(path->topology.vertices[at].delta, choice->path.topology.vertices[at].delta);
+          }
+        }
+      }
+      const double sum = std::accumulate(parts.begin(), parts.end(), 0.0);
+      ASSERT_NEAR(sample.target, sum, 1e-9 * sum) << test.name;
+      ASSERT_EQ(choice.has_value(), sum > 0.0) << test.name;
+      if (!choice) continue;
+      // The share of what was drawn has the mean sum p^2, and a variance of at most 1/4.
+      surprise += chosen / sum;
+      for (const double part : parts) surprise -= (part / sum) * (part / sum);
+      ++count;
+    }
+    EXPECT_GT(count, 100) << test.name;
+    EXPECT_LT(std::abs(surprise), 4.0 * 0.5 * std::sqrt(count)) << test.name;
+  }
 }
 
 /// Numbers with one that steers moved by h.

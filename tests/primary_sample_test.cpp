@@ -11,6 +11,7 @@
 #include "driftlight/error.h"
 #include "driftlight/render.h"
 #include "primary_target.h"
+#include "strategy_target.h"
 #include "support/chi_square.h"
 #include "support/t_test.h"
 #include "support/test_scenes.h"
@@ -113,32 +114,52 @@ TEST(SystematicResampling, TakesEachAsOftenAsItWeighs) {
 }
 
 /// Law: inside a closed diffuse sphere of albedo rho that emits L = 1, paths of n edges bring
-/// rho^(n - 1), by all strategies together and by one at a time.
+/// rho^(n - 1).
 TEST(PrimaryTarget, HasTheIntegralOfAClosedFurnace) {
   const double albedo = 0.6;
   const Scene scene = furnace(albedo);
   const EmissionGuide unguided(scene);
   const PrimaryOptions options;
   std::vector<PrimarySplat> splats;
-  const auto mean = [&](PrimaryTarget::Strategies strategies, int min_edges, int edges) {
-    PrimaryTarget target(scene, unguided, strategies, min_edges, edges);
-    Moments moments;
-    for (std::uint64_t i = 0; i < 20000; ++i) {
-      PrimaryPoint point(options, 4, Stream::Test, i);
-      point.edges = edges;
-      moments.add(target(point, splats));
-    }
-    return moments;
-  };
+  PrimaryTarget target(scene, unguided, 3, 5);
+  Moments all;
+  for (std::uint64_t i = 0; i < 20000; ++i) {
+    PrimaryPoint point(options, 4, Stream::Test, i);
+    all.add(target(point, splats));
+  }
+  const double expected = std::pow(albedo, 2) + std::pow(albedo, 3) + std::pow(albedo, 4);
+  EXPECT_GT(student_p_value(all, expected), 0.01) << all.mean();
+  EXPECT_LT(all.error(), 0.02 * expected);
+}
+
+/// The same by one strategy at a time, and by all with the numbers of one point.
+TEST(StrategyTarget, HasTheIntegralOfAClosedFurnace) {
+  const double albedo = 0.6;
+  const Scene scene = furnace(albedo);
+  const EmissionGuide unguided(scene);
+  PrimaryPlace place;
   const double level = sidak(0.01, 6);
   for (int n = 1; n <= 5; ++n) {
+    StrategyTarget target(scene, unguided, 1, n);
+    Moments one;
+    for (std::uint64_t i = 0; i < 20000; ++i) {
+      Rng rng(4, Stream::Test, i);
+      const StrategyNumbers numbers(n, rng);
+      target(numbers, numbers.strategy(), place);
+      one.add((n + 1) * place.target);
+    }
     const double expected = std::pow(albedo, n - 1);
-    const Moments one = mean(PrimaryTarget::Strategies::One, 1, n);
     EXPECT_GT(student_p_value(one, expected), level) << n << ": " << one.mean();
     EXPECT_LT(one.error(), 0.03 * expected);
   }
+  StrategyTarget target(scene, unguided, 3, 5);
+  Moments all;
+  for (std::uint64_t i = 0; i < 20000; ++i) {
+    Rng rng(4, Stream::Test, i);
+    target.sample(StrategyNumbers(5, rng), rng, place);
+    all.add(place.target);
+  }
   const double expected = std::pow(albedo, 2) + std::pow(albedo, 3) + std::pow(albedo, 4);
-  const Moments all = mean(PrimaryTarget::Strategies::All, 3, 5);
   EXPECT_GT(student_p_value(all, expected), level) << all.mean();
   EXPECT_LT(all.error(), 0.02 * expected);
 }
@@ -151,7 +172,7 @@ TEST(PrimaryTarget, ColoursAreBoundedWhereLightHardlyIs) {
   const Scene scene = bright.with_emitters({emitter});
   const EmissionGuide unguided(scene);
   const PrimaryOptions options;
-  PrimaryTarget target(scene, unguided, PrimaryTarget::Strategies::All, 1, 5);
+  PrimaryTarget target(scene, unguided, 1, 5);
   std::vector<PrimarySplat> splats;
   int seen = 0;
   for (std::uint64_t i = 0; i < 100; ++i) {

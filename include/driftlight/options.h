@@ -182,13 +182,25 @@ struct PrimaryOptions {
 
 /// Of all strategies together (Kelemen et al. 2002).
 struct PssmltOptions : PrimaryOptions {};
+/// How chains whose states are paths of one strategy each draw independent proposals.
+enum class StrategyLargeSteps {
+  One,  ///< of one strategy; chains keep the length of their paths (Hachisuka et al. 2014)
+  All,  ///< a bidirectional sample, of which one path goes on (as in the program of Luan et al.
+        ///< 2020)
+};
+
 /// Of one strategy at a time, which is a coordinate (Hachisuka et al. 2014).
-struct MmltOptions : PrimaryOptions {};
+struct MmltOptions : PrimaryOptions {
+  StrategyLargeSteps large_steps = StrategyLargeSteps::All;
+
+  /// Throws OptionError.
+  void validate() const;
+};
 
 /// As MmltOptions, with small steps that know derivatives of the target (gaussian_step.h).
-struct GaussianStepOptions : PrimaryOptions {
-  /// Share of the small steps that are those of Kelemen et al. all the same. They alone change the
-  /// strategy.
+struct GaussianStepOptions : MmltOptions {
+  /// Share of the small steps that are those of Kelemen et al. all the same. With
+  /// StrategyLargeSteps::One they alone change the strategy.
   double isotropic_probability = 0.1;
 };
 /// Hessian-Hamiltonian dynamics (Li et al. 2015).
@@ -271,6 +283,7 @@ std::vector<OptionEntry> entries(PathOptions& options);
 std::vector<OptionEntry> entries(BdptOptions& options);
 std::vector<OptionEntry> entries(LightOptions& options);
 std::vector<OptionEntry> entries(PrimaryOptions& options);
+std::vector<OptionEntry> entries(MmltOptions& options);
 std::vector<OptionEntry> entries(H2mcOptions& options);
 std::vector<OptionEntry> entries(LmcOptions& options);
 std::vector<OptionEntry> entries(MltOptions& options);
