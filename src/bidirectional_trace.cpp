@@ -86,7 +86,7 @@ class TwoSidedTracer {
       return RayFollower(scene_, y, y, parallel->direction);
     const Shape& shape = scene_.shapes()[std::get<AreaEmitter>(emitter).shape];
     const Vec3d& v = coordinates_(next_block_++);
-    emitter_point_ = {y, emitter_normal(shape, y)};
+    emitter_point_ = {.p = y, .n = emitter_normal(shape, y)};
     if (!(emitter_point_.n.dot(v) > 0.0)) return std::nullopt;
     return RayFollower(scene_, y, scene_.leave(y, emitter_point_.n, v), v);
   }

@@ -88,7 +88,9 @@ int lobe_count(const Bsdf& bsdf) {
   if (diffuse != nullptr && diffuse->reflectance.is_constant() &&
       (diffuse->reflectance.color == 0.0).all())
     return 0;
-  return std::holds_alternative<Phong>(bsdf) || std::holds_alternative<RoughPlastic>(bsdf) ? 2 : 1;
+  const bool has_two = std::holds_alternative<Phong>(bsdf) || std::holds_alternative<Ward>(bsdf) ||
+                       std::holds_alternative<RoughPlastic>(bsdf);
+  return has_two ? 2 : 1;
 }
 
 double delta_eta(const Bsdf& bsdf) {

@@ -28,6 +28,10 @@ void for_each_texture(const Bsdf& bsdf, const Visit& visit) {
       visit(b.diffuse_reflectance);
       visit(b.specular_reflectance);
     }
+    void operator()(const Ward& b) const {
+      visit(b.diffuse_reflectance);
+      visit(b.specular_reflectance);
+    }
     void operator()(const Plastic& b) const {
       visit(b.base.reflectance);
       visit(b.specular_reflectance);

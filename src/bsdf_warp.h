@@ -147,8 +147,9 @@ T pdf_bsdf(const RoughDielectric& b, const SurfacePoint<T>& at, const Vec3<T>& w
   return p * (1.0 - fresnel) * e * e * abs(oh) / (denominator * denominator);
 }
 
-template <Scalar T>
-T specular_probability(const Phong& b, const Vec2<T>& uv) {
+/// Of Phong and Ward.
+template <Scalar T, class B>
+T specular_probability(const B& b, const Vec2<T>& uv) {
   const T specular = luminance(b.specular_reflectance.eval(uv));
   const T diffuse = luminance(b.diffuse_reflectance.eval(uv));
   const T sum = specular + diffuse;
@@ -188,6 +189,28 @@ T pdf_bsdf(const Phong& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const V
   const T s = specular_probability(b, at.uv);
   const T lobe = phong_pdf(b, T(dot(wo, reflect(wi, at.n))));
   return s * lobe + (1.0 - s) * cos_o * kInvPi;
+}
+
+template <Scalar T>
+Warped<T> warp_bsdf(const Ward& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& u) {
+  if (value(at.n).dot(value(wi)) <= 0.0) return std::nullopt;
+  const Vec2d uv{value(at.uv.x()), value(at.uv.y())};
+  if (!(value(u.z()) < specular_probability(b, uv)))
+    return reflected<T>(warp_diffuse(at.n, u), wi, at.n);
+  const Vec3<T> local = b.microfacets().sample<T>(to_local<T>(wi, at.n), u.x(), u.y());
+  return reflected<T>(reflect(wi, to_world<T>(local, at.n)), wi, at.n);
+}
+
+template <Scalar T>
+T pdf_bsdf(const Ward& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& wo) {
+  const T cos_i = dot(at.n, wi);
+  const T cos_o = dot(at.n, wo);
+  if (value(cos_i) <= 0.0 || value(cos_o) <= 0.0) return constant<T>(0.0);
+  const T s = specular_probability(b, at.uv);
+  const Vec3<T> h = unit<T>(wi + wo);
+  const T ih = dot(wi, h);
+  return s * b.microfacets().pdf<T>(cos_i, dot(at.n, h), ih) / (4.0 * ih) +
+         (1.0 - s) * cos_o * kInvPi;
 }
 
 /// With which the coat is taken: in proportion to F and T, and to what coat and base reflect.

@@ -54,7 +54,7 @@ LightEnd area_end(const Scene& scene, std::uint32_t index, const EmitterPoint& y
   end.emitter = index;
   end.p = y.p;
   end.n = y.n;
-  end.emitted = light.radiance;
+  end.emitted = light.radiance_at(y.uv);
   end.density = scene.emitter_probability(index) / scene.shapes()[light.shape].extent.area;
   return end;
 }
@@ -78,7 +78,7 @@ std::optional<LightEnd> light_end_at(const Scene& scene, const SurfaceHit& surfa
   const auto& emitter = scene.shapes()[surface.hit.shape].emitter;
   if (!emitter || !surface.front) return std::nullopt;
   if (!std::holds_alternative<AreaEmitter>(scene.emitters()[*emitter])) return std::nullopt;
-  return area_end(scene, *emitter, {surface.at.p, surface.at.n_g});
+  return area_end(scene, *emitter, {surface.at.p, surface.at.n_g, surface.at.uv});
 }
 
 std::optional<LightEnd> light_end_toward(const Scene& scene, const Vec3d& direction) {
@@ -98,8 +98,8 @@ LightEdge edge_to(const LightEnd& end, const Vec3d& p) {
 bool reaches(const Scene& scene, const LightEnd& end, const SurfaceHit& surface,
              const LightEdge& edge) {
   if (end.at_infinity()) return infinity_status(scene, surface, edge.direction) == TraceStatus::Ok;
-  return connection_status(scene, surface, scene.emitters()[end.emitter], {end.p, end.n}) ==
-         TraceStatus::Ok;
+  return connection_status(scene, surface, scene.emitters()[end.emitter],
+                           {.p = end.p, .n = end.n}) == TraceStatus::Ok;
 }
 
 }  // namespace driftlight

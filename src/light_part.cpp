@@ -11,7 +11,7 @@ LightPart light_part_from(const LightEnd& end) {
   if (light.infinite)
     light.sky = end.p;
   else
-    light.point = {end.p, end.n};
+    light.point = {.p = end.p, .n = end.n};
   return light;
 }
 

@@ -23,6 +23,7 @@ struct BsdfKind {
     return "rough dielectric " + name(b.microfacets);
   }
   std::string operator()(const Phong&) const { return "phong"; }
+  std::string operator()(const Ward&) const { return "ward"; }
   std::string operator()(const Plastic&) const { return "plastic"; }
   std::string operator()(const RoughPlastic& b) const {
     return "rough plastic " + name(b.microfacets);
@@ -44,6 +45,14 @@ std::string passage(const ScatterEvent<double>& e) {
 
 std::string lobe(const Phong& b, const ScatterEvent<double>& e) {
   const double lobe = detail::phong_lobe(b, e.wo.dot(reflect(e.wi, e.at.n_s)));
+  const double specular = luminance(b.specular_reflectance.eval(e.at.uv)) * lobe;
+  const double diffuse = luminance(b.diffuse_reflectance.eval(e.at.uv)) * kInvPi;
+  return specular > diffuse ? " glossy lobe" : " diffuse lobe";
+}
+
+std::string lobe(const Ward& b, const ScatterEvent<double>& e) {
+  const Vec3d& n = e.at.n_s;
+  const double lobe = detail::ward_lobe(b, n.dot(e.wi), n.dot(e.wo), e.wi.dot(e.wo));
   const double specular = luminance(b.specular_reflectance.eval(e.at.uv)) * lobe;
   const double diffuse = luminance(b.diffuse_reflectance.eval(e.at.uv)) * kInvPi;
   return specular > diffuse ? " glossy lobe" : " diffuse lobe";
@@ -73,6 +82,7 @@ std::string lobe(const ScatterEvent<double>& e, bool delta) {
   if (is_transmissive(e.bsdf)) return kind + passage(e);
   if (blend != nullptr) return kind + lobe(*blend, e);
   if (const auto* phong = std::get_if<Phong>(&e.bsdf)) return kind + lobe(*phong, e);
+  if (const auto* ward = std::get_if<Ward>(&e.bsdf)) return kind + lobe(*ward, e);
   if (const auto* plastic = std::get_if<RoughPlastic>(&e.bsdf)) return kind + lobe(*plastic, e);
   return kind;
 }

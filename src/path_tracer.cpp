@@ -94,11 +94,12 @@ class Estimator {
     if (!at.front) return Rgbd::Zero();
     const auto& light = std::get<AreaEmitter>(scene_.emitters()[*shape.emitter]);
     const double cosine = at.at.n_g.dot(at.wi);
-    if (last.delta) return light.radiance;
+    const Rgbd radiance = light.radiance_at(at.at.uv);
+    if (last.delta) return radiance;
     const double r2 = (at.at.p - last.p).squaredNorm();
     const double other =
         scene_.emitter_probability(*shape.emitter) / shape.extent.area * r2 / cosine;
-    return balance(last.pdf, other) * light.radiance;
+    return balance(last.pdf, other) * radiance;
   }
 
   /// Next-event estimation with one emitter sample.
@@ -129,7 +130,7 @@ class Estimator {
     const double density =
         choice / scene_.shapes()[light->shape].extent.area * r2 / cosine;  // per solid angle
     const double w = balance(density, pdf(*at.bsdf, at.surface(), at.wi, wo));
-    return w / density * f * light->radiance;
+    return w / density * f * light->radiance_at(y.uv);
   }
 
   /// Of a point or spot emitter along the unit direction v.

@@ -13,6 +13,7 @@ namespace driftlight {
 bool has_points(const Shape& emitter) {
   // A cylinder may be so thin or flat that its extent is.
   if (std::holds_alternative<Cylinder>(emitter.geometry)) return false;
+  if (emitter.bent_emission) return false;
   return emitter.extent.planar || std::holds_alternative<Sphere>(emitter.geometry);
 }
 

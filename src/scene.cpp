@@ -270,6 +270,20 @@ ShapeExtent extent_of(const Geometry& geometry) {
   return extent;
 }
 
+/// False if uv are not one linear function over the plane of the mesh.
+bool has_linear_uv(const TriangleMesh& mesh) {
+  constexpr double kTolerance = 1e-4;
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    const std::array<Vec3d, 3> corner = corners(mesh, i);
+    for (int j = 0; j < 3; ++j) {
+      const Vec2d own = triangle_uv<double>(mesh, i, j == 1 ? 1.0 : 0.0, j == 2 ? 1.0 : 0.0);
+      const Vec2d first = triangle_uv(mesh, 0, corner[static_cast<std::size_t>(j)]);
+      if (!((own - first).cwiseAbs().maxCoeff() <= kTolerance)) return false;
+    }
+  }
+  return true;
+}
+
 DiscreteDistribution triangles_by_area(const TriangleMesh& mesh) {
   std::vector<double> areas;
   areas.reserve(mesh.triangles.size());
@@ -392,6 +406,26 @@ std::uint32_t SceneBuilder::add_material(const Material& material) {
   return static_cast<std::uint32_t>(scene_.surfaces_->materials.size() - 1);
 }
 
+namespace {
+
+std::shared_ptr<const Texture> divided(const Texture& texture, const Rgbd& by) {
+  auto result = std::make_shared<Texture>(texture);
+  result->scale *= (by > 0.0).select(1.0 / by, 1.0);
+  return result;
+}
+
+}  // namespace
+
+std::uint32_t SceneBuilder::add_shape(Geometry geometry, std::uint32_t material,
+                                      const Texture& radiance) {
+  const Rgbd mean = radiance.average();
+  const Rgbd unit = (mean > 0.0).select(mean, radiance.maximum_color());
+  const std::uint32_t index = add_shape(std::move(geometry), material, unit);
+  if (!radiance.is_constant())
+    std::get<AreaEmitter>(scene_.emitters_.back()).texture = divided(radiance, unit);
+  return index;
+}
+
 std::uint32_t SceneBuilder::add_shape(Geometry geometry, std::uint32_t material,
                                       std::optional<Rgbd> radiance) {
   if (const auto* mesh = std::get_if<TriangleMesh>(&geometry)) {
@@ -424,7 +458,7 @@ std::uint32_t SceneBuilder::add_shape(Geometry geometry, std::uint32_t material,
   shape.material = material;
   if (radiance) {
     shape.emitter = static_cast<std::uint32_t>(scene_.emitters_.size());
-    scene_.emitters_.emplace_back(AreaEmitter{*radiance, index});
+    scene_.emitters_.emplace_back(AreaEmitter{*radiance, index, nullptr});
   }
   scene_.surfaces_->shapes.push_back(std::move(shape));
   return index;
@@ -454,9 +488,15 @@ Scene SceneBuilder::build() {
     shape.textured = shape.relief != nullptr ||
                      is_textured(scene.surfaces_->bsdfs.at(material.front)) ||
                      (material.back && is_textured(scene.surfaces_->bsdfs.at(*material.back)));
-    if (shape.emitter)
-      if (const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry))
+    if (shape.emitter) {
+      const bool emits_texture =
+          std::get<AreaEmitter>(scene.emitters_[*shape.emitter]).texture != nullptr;
+      shape.textured |= emits_texture;
+      if (const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry)) {
         shape.triangles = triangles_by_area(*mesh);
+        shape.bent_emission = emits_texture && !has_linear_uv(*mesh);
+      }
+    }
     box.extend(std::visit([](const auto& s) { return bounds_of(s); }, shape.geometry));
   }
   for (const Emitter& emitter : scene.emitters_)

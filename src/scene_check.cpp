@@ -47,9 +47,8 @@ struct Brightness {
   double operator()(const RoughConductor& b) const { return b.specular_reflectance.maximum(); }
   double operator()(const Dielectric& b) const { return largest(b); }
   double operator()(const RoughDielectric& b) const { return largest(b); }
-  double operator()(const Phong& b) const {
-    return std::max(b.diffuse_reflectance.maximum(), b.specular_reflectance.maximum());
-  }
+  double operator()(const Phong& b) const { return glossy(b); }
+  double operator()(const Ward& b) const { return glossy(b); }
   double operator()(const Plastic& b) const { return coated(b); }
   double operator()(const RoughPlastic& b) const { return coated(b); }
   double operator()(const ThinDielectric& b) const { return largest(b); }
@@ -61,6 +60,10 @@ struct Brightness {
   }
   double operator()(const Blend& b) const {
     return std::max(std::visit(*this, b.first->bsdf), std::visit(*this, b.second->bsdf));
+  }
+  template <class B>
+  static double glossy(const B& b) {
+    return std::max(b.diffuse_reflectance.maximum(), b.specular_reflectance.maximum());
   }
   template <class B>
   static double coated(const B& b) {

@@ -79,13 +79,14 @@ class VertexVisitor : public WalkVisitor<double> {
   void hit(const AreaEmitter&, const double&, const double&) {
     const Ray<double> ray{before_last_, (last_ - before_last_).normalized()};
     const Hit& hit = topology_.vertices[topology_.scatter_count].hit;
-    end_on_area({last_, scene_.interact(hit, ray).n_g});
+    const Interaction<double> at = scene_.interact(hit, ray);
+    end_on_area({last_, at.n_g, at.uv});
   }
   void area_connection(const AreaEmitter& light, const double&, const double&) {
-    end_on_area({last_, emitter_normal(scene_.shapes()[light.shape], last_)});
+    end_on_area(light, emitter_normal(scene_.shapes()[light.shape], last_));
   }
-  void area_emission(const AreaEmitter&, const Vec3d& normal, const Vec3d&) {
-    end_on_area({last_, normal});
+  void area_emission(const AreaEmitter& light, const Vec3d& normal, const Vec3d&) {
+    end_on_area(light, normal);
   }
   void environment(const Emitter&, const Vec3d& v) {
     path_.end = light_end_toward(scene_, v).value();
@@ -101,6 +102,11 @@ class VertexVisitor : public WalkVisitor<double> {
     path_(index_ + 1) = {{hit, e.at, e.wi, true, &e.bsdf}, delta, e.scattering};
   }
   void end_on_area(const EmitterPoint& y) { path_.end = area_end(scene_, topology_.emitter, y); }
+  void end_on_area(const AreaEmitter& light, const Vec3d& normal) {
+    EmitterPoint y{.p = last_, .n = normal};
+    if (light.texture != nullptr) y.uv = emitter_uv(scene_.shapes()[light.shape], last_);
+    end_on_area(y);
+  }
   void end_on_delta() { path_.end = light_end_from(scene_, topology_.emitter, {0.0, 0.0}); }
 
   const Scene& scene_;

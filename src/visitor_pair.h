@@ -73,6 +73,10 @@ struct VisitorPair : WalkVisitor<T> {
     first.area_emission(emitter, normal, v);
     second.area_emission(emitter, normal, v);
   }
+  void emission_texture(const Texture& texture, const Vec2<T>& uv) {
+    first.emission_texture(texture, uv);
+    second.emission_texture(texture, uv);
+  }
   void point_emission(const Emitter& emitter, const Vec3<T>& v) {
     first.point_emission(emitter, v);
     second.point_emission(emitter, v);

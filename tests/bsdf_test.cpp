@@ -57,6 +57,11 @@ std::vector<Named> scattering_bsdfs() {
   result.push_back({"phong 400", Phong{Texture(Rgbd::Constant(0.2)), half, 400}});
   result.push_back(
       {"phong textured", Phong{bitmap_texture(0.1, 0.4), bitmap_texture(0.0, 0.6), 40}});
+  const Texture low(Rgbd::Constant(0.2));
+  result.push_back({"ward", Ward{Ward::Variant::Ward, 0.3, half, low}});
+  result.push_back({"ward-duer", Ward{Ward::Variant::Duer, 0.3, half, low}});
+  result.push_back({"balanced ward 0.1", Ward{Ward::Variant::Balanced, 0.1,
+                                              bitmap_texture(0.1, 0.4), bitmap_texture(0.1, 0.5)}});
   for (const bool nonlinear : {false, true})
     result.push_back(
         {"rough plastic", RoughPlastic({Distribution::Ggx, 0.3}, 1.5, kWhite, kWhite, nonlinear)});
@@ -199,7 +204,10 @@ TEST(Bsdf, WhiteFurnaceGainsNoEnergy) {
         energy.add(index * eval_luminance(named.bsdf, wi, next->wo) /
                    pdf(named.bsdf, kPoint, wi, next->wo));
       }
-      EXPECT_LT(energy.mean(), 1.0 + 4.0 * energy.error() + 1e-3)
+      // Duer's model does, at grazing angles, which is what the balanced one is for.
+      const auto* ward = std::get_if<Ward>(&named.bsdf);
+      const bool may_gain = ward != nullptr && ward->variant == Ward::Variant::Duer;
+      EXPECT_TRUE(may_gain || energy.mean() < 1.0 + 4.0 * energy.error() + 1e-3)
           << named.name << " cos " << kPoint.n.dot(wi);
       // Nor does it lose more than single scattering does.
       EXPECT_GT(energy.mean(), 0.2) << named.name << " cos " << kPoint.n.dot(wi);

@@ -208,6 +208,7 @@ TEST(Contribution, SumOfLogarithmsEqualsTheProduct) {
       multiply(eval_delta(e.bsdf, e.surface(), e.wi, e.scattering));
     }
     void hit(const AreaEmitter& emitter, const double&, const double&) { f *= emitter.radiance; }
+    void emission_texture(const Texture& texture, const Vec2d& uv) { f *= texture.eval(uv); }
     void environment(const Emitter& emitter, const Vec3d& v) {
       const auto* map = std::get_if<EnvironmentMap>(&emitter);
       f *= map != nullptr ? map->eval(v) : std::get<ConstantEnvironment>(emitter).radiance;

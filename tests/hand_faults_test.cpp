@@ -159,6 +159,14 @@ std::vector<Fault> scatter_faults() {
                     [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
                       if (is<Phong>(b)) f.v[1] *= -1.0;
                     }),
+      scatter_fault("Ward: sign of red by wi.wo",
+                    [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
+                      if (is<Ward>(b)) f.io[0] *= -1.0;
+                    }),
+      scatter_fault("Ward: factor by cos_i",
+                    [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
+                      if (is<Ward>(b)) f.cos_i[1] *= 1.01;
+                    }),
       scatter_fault("plastic: sign of the slope of T by cos_i",
                     [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
                       if (is<Plastic>(b)) f.cos_i[3] *= -1.0;

@@ -160,10 +160,82 @@ TEST(ObjFile, GroupsAreSmoothedApart) {
   EXPECT_EQ(load_meshes("obj", groups, R"(<boolean name="collapse" value="true"/>)").size(), 1U);
 }
 
-TEST(ObjFile, MaterialsOfTheFileNeedABsdf) {
-  const std::string file = "mtllib a.mtl\nusemtl red\n" + kSquare;
-  expect_contains(mesh_error("obj", file), ".mtl");
-  EXPECT_EQ(load_meshes("obj", file, "<bsdf type=\"diffuse\"/>").size(), 1U);
+/// Five squares: without a material, red, glass, gold, red again.
+const std::string kPainted =
+    "mtllib some.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\n"
+    "f 1/1 2/1 3/1 4/1\nusemtl red \nf 1/1 2/1 3/1 4/1\nusemtl wine glass\nf 1/1 2/1 3/1 4/1\n"
+    "g other\nusemtl gold\nf 1/1 2/1 3/1 4/1\nusemtl red\nf 1/1 2/1 3/1 4/1\n";
+
+/// The scene of that file.
+LoadedScene load_painted(const SceneDirectory& directory, const std::string& content = "") {
+  directory.write("mesh", kPainted);
+  return directory.load(lit(shape_element("obj", content)));
+}
+
+/// The front of each of its squares.
+std::vector<Bsdf> fronts(const Scene& scene) {
+  std::vector<Bsdf> result;
+  for (const Shape& shape : scene.shapes())
+    result.push_back(scene.bsdfs()[scene.materials()[shape.material].front]);
+  return result;
+}
+
+TEST(ObjFile, TakesMaterialsFromItsLibrary) {
+  const SceneDirectory directory;
+  directory.write("some.mtl",
+                  "# paint\nnewmtl red\n  Kd 0.5 0 1\n Ks .2 .2 .2\nNs 40\nillum 2\r\nTr 1\n\n"
+                  "newmtl wine glass\nillum 7\nnewmtl gold\nillum 2\nKd 1 1 0\nNs 40\nd 0.25\n");
+  const std::vector<Bsdf> bsdfs = fronts(load_painted(directory).scene);
+  ASSERT_EQ(bsdfs.size(), 5U);
+  expect_near(std::get<Diffuse>(bsdfs[0]).reflectance.color, Rgbd(0.5, 0.5, 0.5));
+  for (const std::size_t i : {1U, 4U}) {
+    const auto& red = std::get<Phong>(bsdfs[i]);
+    expect_near(red.diffuse_reflectance.color, Rgbd(Rgbd(0.2140411, 0, 1) * (0.99 / 1.0331048)),
+                1e-6);
+    EXPECT_EQ(red.exponent, 40.0);
+  }
+  EXPECT_TRUE(std::holds_alternative<Dielectric>(bsdfs[2]));
+  const auto& gold = std::get<Mask>(bsdfs[3]);
+  expect_near(gold.opacity.color, Rgbd(0.25, 0.25, 0.25));
+  EXPECT_TRUE(std::holds_alternative<Diffuse>(gold.nested->bsdf));
+}
+
+TEST(ObjFile, TheSceneMayNameItsMaterials) {
+  const SceneDirectory directory;
+  directory.write("some.mtl", "newmtl red\nKd 1 0 0\nnewmtl gold\nillum 5\n");
+  const std::string metal = R"(<bsdf name="red" type="conductor"/>)";
+  const LoadedScene named = load_painted(directory, metal + R"(<bsdf name="blue" type="phong"/>)");
+  const std::vector<Bsdf> bsdfs = fronts(named.scene);
+  EXPECT_TRUE(std::holds_alternative<Conductor>(bsdfs[1]));
+  EXPECT_TRUE(std::holds_alternative<Diffuse>(bsdfs[2]));
+  EXPECT_TRUE(std::holds_alternative<Conductor>(bsdfs[3]));
+  expect_contains(named.notices.back(), "'blue'");
+  for (const Bsdf& bsdf : fronts(load_painted(directory, R"(<bsdf type="plastic"/>)").scene))
+    EXPECT_TRUE(std::holds_alternative<Plastic>(bsdf));
+  const std::string off = R"(<boolean name="loadMaterials" value="false"/>)";
+  for (const Bsdf& bsdf : fronts(load_painted(directory, off).scene))
+    EXPECT_TRUE(std::holds_alternative<Diffuse>(bsdf));
+}
+
+TEST(ObjFile, SaysWhatIsWrongWithALibrary) {
+  const SceneDirectory directory;
+  ASSERT_EQ(load_painted(directory).notices.size(), 1U);
+  expect_contains(load_painted(directory).notices[0], "some.mtl");
+  directory.write("some.mtl", "newmtl red\nmap_Kd nowhere.png\n");
+  expect_contains(load_painted(directory).notices.at(0), "nowhere.png");
+  const auto location = [&](const std::string& library) {
+    directory.write("some.mtl", library);
+    try {
+      load_painted(directory);
+    } catch (const SceneError& error) {
+      EXPECT_EQ(std::filesystem::path(error.location().file).filename(), "some.mtl");
+      return static_cast<int>(error.location().line);
+    }
+    return 0;
+  };
+  EXPECT_EQ(location("newmtl red\n\nKd 1 zero 0\n"), 3);
+  // Smooth glass under a mask is not supported.
+  EXPECT_EQ(location("newmtl red\n\nnewmtl glass\nillum 4\nd 0.5\n"), 3);
 }
 
 TEST(ObjFile, RefusesBadFiles) {

@@ -100,6 +100,19 @@ TEST(BsdfsXml, ReadsRoughDielectrics) {
   EXPECT_NEAR(glass.eta, 1.5046 / kAir, 1e-12);
 }
 
+TEST(BsdfsXml, ReadsWard) {
+  const auto plain = std::get<Ward>(load_bsdf("<bsdf type=\"ward\"/>"));
+  EXPECT_EQ(plain.variant, Ward::Variant::Balanced);
+  EXPECT_EQ(plain.alpha, 0.1);
+  expect_near(plain.diffuse_reflectance.color, Rgbd(0.5, 0.5, 0.5));
+  expect_near(plain.specular_reflectance.color, Rgbd(0.2, 0.2, 0.2));
+  const auto rough =
+      std::get<Ward>(load_bsdf(R"(<bsdf type="ward"><string name="variant" value="ward-duer"/>
+                   <float name="alphaU" value="0.3"/><float name="alphaV" value="0.3"/></bsdf>)"));
+  EXPECT_EQ(rough.variant, Ward::Variant::Duer);
+  EXPECT_EQ(rough.alpha, 0.3);
+}
+
 TEST(BsdfsXml, ReadsPhong) {
   const std::string colors = R"(<rgb name="diffuseReflectance" value="0.6, 0.1, 0"/>
                                 <rgb name="specularReflectance" value="0.6, 0.2, 0.3"/>)";
@@ -322,6 +335,22 @@ TEST(EmittersXml, ReadsAreaEmitters) {
   const auto& area = std::get<AreaEmitter>(loaded.scene.emitters()[0]);
   expect_near(area.radiance, Rgbd(1, 2, 3));
   EXPECT_EQ(area.shape, 1U);
+}
+
+/// A textured one emits in the mean what its texture does, and where that says.
+TEST(EmittersXml, ReadsTexturedAreaEmitters) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(with_sensor(
+      R"(<shape type="rectangle"><emitter type="area"><texture name="radiance" type="checkerboard">
+         <rgb name="color0" value="3, 2, 0"/><rgb name="color1" value="1, 0, 0"/></texture>
+         </emitter></shape>)"));
+  ASSERT_EQ(loaded.scene.emitters().size(), 1U);
+  const auto& area = std::get<AreaEmitter>(loaded.scene.emitters()[0]);
+  expect_near(area.radiance, Rgbd(2, 1, 0));
+  expect_near(area.radiance_at({0.25, 0.25}), Rgbd(3, 2, 0));
+  expect_near(area.radiance_at({0.75, 0.25}), Rgbd(1, 0, 0));
+  EXPECT_TRUE(loaded.scene.shapes()[0].textured);
+  EXPECT_FALSE(loaded.scene.shapes()[0].bent_emission);
 }
 
 TEST(EmittersXml, ReadsPoints) {

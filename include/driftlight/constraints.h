@@ -159,6 +159,18 @@ class ConstraintVisitor : public WalkVisitor<T> {
     if (value(of.second) > 0.0) constrain(b.second->bsdf, e, S(share * of.second));
   }
 
+  /// Two lobes, as Phong's.
+  void constrain(const Ward& b, const ScatterEvent<T>& e, const S& share) {
+    const S lobe = detail::ward_lobe(b, S(strip(dot(e.at.n_s, e.wi))),
+                                     S(strip(dot(e.at.n_s, e.wo))), S(strip(dot(e.wi, e.wo))));
+    const S specular = luminance(b.specular_reflectance.eval(uv_of(e))) * lobe;
+    const S diffuse = luminance(b.diffuse_reflectance.eval(uv_of(e))) * kInvPi;
+    if (!(value(specular) + value(diffuse) > 0.0)) return;
+    const S glossy = specular / (specular + diffuse);
+    if (value(glossy) > 0.0) add_slopes(b.microfacets(), slopes(e, 1.0), S(share * glossy));
+    if (value(glossy) < 1.0) add_diffuse(e, S(share * (1.0 - glossy)));
+  }
+
   /// Two lobes, each weighted by its share of f at X. The glossy one constrains wo to the mirror
   /// direction with sigma = 1 / sqrt(n).
   void constrain(const Phong& b, const ScatterEvent<T>& e, const S& share) {

@@ -73,6 +73,7 @@ class ContributionVisitor : public WalkVisitor<T> {
   void directional_connection(const DirectionalEmitter& emitter) {
     color_ *= constant<T>(emitter.irradiance);
   }
+  void emission_texture(const Texture& texture, const Vec2<T>& uv) { color_ *= texture.eval(uv); }
 
   void light_scatter(const ScatterEvent<T>& e) {
     using std::abs;

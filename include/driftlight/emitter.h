@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <variant>
 
 #include "driftlight/frame.h"
@@ -11,10 +12,17 @@
 
 namespace driftlight {
 
-/// A shape that emits constant radiance from the side of its normal.
+/// A shape that emits from the side of its normal, the same radiance into all directions.
 struct AreaEmitter {
-  Rgbd radiance{1, 1, 1};
+  Rgbd radiance{1, 1, 1};  ///< of a texture the mean, or what is at most beyond a black bitmap
   std::uint32_t shape = 0;
+  /// The radiance over that; null: the same all over.
+  std::shared_ptr<const Texture> texture = nullptr;
+
+  /// Radiance where the shape has these texture coordinates.
+  Rgbd radiance_at(const Vec2d& uv) const {
+    return texture != nullptr ? Rgbd(radiance * texture->eval(uv)) : radiance;
+  }
 };
 
 /// Equal intensity (power per steradian) in all directions.

@@ -115,6 +115,62 @@ inline Vec3d shading_normal(const TriangleMesh& mesh, std::uint32_t triangle, co
   return ((1.0 - b1 - b2) * normal(0) + b1 * normal(1) + b2 * normal(2)).normalized();
 }
 
+// ---- Texture coordinates --------------------------------------------------------------------
+
+/// At the barycentric coordinates b1, b2 of a triangle.
+template <Scalar T>
+Vec2<T> triangle_uv(const TriangleMesh& mesh, std::uint32_t triangle, const T& b1, const T& b2) {
+  if (mesh.uvs.empty()) return {b1, b2};
+  const auto& index = mesh.triangles[triangle];
+  const Vec2d u0 = mesh.uvs[index[0]].cast<double>();
+  const Vec2d u1 = mesh.uvs[index[1]].cast<double>() - u0;
+  const Vec2d u2 = mesh.uvs[index[2]].cast<double>() - u0;
+  return {b1 * u1.x() + b2 * u2.x() + u0.x(), b1 * u1.y() + b2 * u2.y() + u0.y()};
+}
+
+/// At a point of the triangle's plane.
+template <Scalar T>
+Vec2<T> triangle_uv(const TriangleMesh& mesh, std::uint32_t triangle, const Vec3<T>& p) {
+  const std::array<Vec3d, 3> corner = corners(mesh, triangle);
+  const Vec3d e1 = corner[1] - corner[0];
+  const Vec3d e2 = corner[2] - corner[0];
+  const Vec3d n = e1.cross(e2);
+  const Vec3d c1 = e2.cross(n) / n.squaredNorm();
+  const Vec3d c2 = n.cross(e1) / n.squaredNorm();
+  return triangle_uv(mesh, triangle, T(dot(c1, p) - c1.dot(corner[0])),
+                     T(dot(c2, p) - c2.dot(corner[0])));
+}
+
+/// phi / (2 pi) in [0, 1], from its cosine and sine or what is proportional to them.
+template <Scalar T>
+T azimuth_share(const T& cosine, const T& sine) {
+  using std::atan2;
+  const T phi = atan2(sine, cosine) * (0.5 * kInvPi);
+  return value(phi) < 0.0 ? T(phi + 1.0) : phi;
+}
+
+/// Where the outward normal is n.
+template <Scalar T>
+Vec2<T> sphere_uv(const Sphere& sphere, const Vec3<T>& n) {
+  using std::acos;
+  const Vec3d x = sphere.to_local.row(0);
+  const Vec3d y = sphere.to_local.row(1);
+  const Vec3d z = sphere.to_local.row(2);
+  return {azimuth_share(dot(x, n), dot(y, n)), acos(dot(z, n)) * kInvPi};
+}
+
+/// At a point of the disk's plane.
+template <Scalar T>
+Vec2<T> disk_uv(const Disk& disk, const Vec3<T>& p) {
+  using std::sqrt;
+  const Vec3d n = disk.u.cross(disk.v);
+  const Vec3d cu = disk.v.cross(n) / n.squaredNorm();
+  const Vec3d cv = n.cross(disk.u) / n.squaredNorm();
+  const T s = dot(cu, p) - cu.dot(disk.center);
+  const T q = dot(cv, p) - cv.dot(disk.center);
+  return {sqrt(s * s + q * q), azimuth_share(s, q)};
+}
+
 namespace detail {
 
 /// t = n.(p0 - o) / n.d meets the triangle's plane; barycentric b1, b2 by Cramer's rule:
@@ -151,16 +207,7 @@ Interaction<T> interact_shape(const TriangleMesh& mesh, std::uint32_t primitive,
                                 b1 * edge1.z() + b2 * edge2.z() + n0.z()});
     if (unit.dot(value(at.n_s)) < 0.0) at.n_g = constant<T>(Vec3d(-unit));
   }
-  if (want_uv) {
-    if (mesh.uvs.empty()) {
-      at.uv = {b1, b2};
-    } else {
-      const Vec2d u0 = mesh.uvs[index[0]].cast<double>();
-      const Vec2d u1 = mesh.uvs[index[1]].cast<double>() - u0;
-      const Vec2d u2 = mesh.uvs[index[2]].cast<double>() - u0;
-      at.uv = {b1 * u1.x() + b2 * u2.x() + u0.x(), b1 * u1.y() + b2 * u2.y() + u0.y()};
-    }
-  }
+  if (want_uv) at.uv = triangle_uv(mesh, primitive, b1, b2);
   return at;
 }
 
@@ -170,8 +217,6 @@ Interaction<T> interact_shape(const TriangleMesh& mesh, std::uint32_t primitive,
 template <Scalar T>
 Interaction<T> interact_shape(const Sphere& sphere, std::uint32_t primitive, const Ray<T>& ray,
                               bool want_uv) {
-  using std::acos;
-  using std::atan2;
   using std::sqrt;
   const Vec3<T> oc = {ray.origin.x() - sphere.center.x(), ray.origin.y() - sphere.center.y(),
                       ray.origin.z() - sphere.center.z()};
@@ -186,21 +231,13 @@ Interaction<T> interact_shape(const Sphere& sphere, std::uint32_t primitive, con
   at.n_g = sphere.flip_normals ? Vec3<T>(-n) : n;
   at.n_s = at.n_g;
   at.uv = constant<T>(Vec2d(0, 0));
-  if (want_uv) {
-    const Vec3d x = sphere.to_local.row(0);
-    const Vec3d y = sphere.to_local.row(1);
-    const Vec3d z = sphere.to_local.row(2);
-    const T phi = atan2(dot(y, n), dot(x, n)) * (0.5 * kInvPi);
-    at.uv = {value(phi) < 0.0 ? T(phi + 1.0) : phi, acos(dot(z, n)) * kInvPi};
-  }
+  if (want_uv) at.uv = sphere_uv(sphere, n);
   return at;
 }
 
 template <Scalar T>
 Interaction<T> interact_shape(const Disk& disk, std::uint32_t /*primitive*/, const Ray<T>& ray,
                               bool want_uv) {
-  using std::atan2;
-  using std::sqrt;
   const Vec3d n = disk.u.cross(disk.v);
   const T t = (n.dot(disk.center) - dot(n, ray.origin)) * (1.0 / dot(n, ray.direction));
   Interaction<T> at;
@@ -208,14 +245,7 @@ Interaction<T> interact_shape(const Disk& disk, std::uint32_t /*primitive*/, con
   at.n_g = constant<T>(Vec3d(n.normalized()));
   at.n_s = at.n_g;
   at.uv = constant<T>(Vec2d(0, 0));
-  if (want_uv) {
-    const Vec3d cu = disk.v.cross(n) / n.squaredNorm();
-    const Vec3d cv = n.cross(disk.u) / n.squaredNorm();
-    const T s = dot(cu, at.p) - cu.dot(disk.center);
-    const T q = dot(cv, at.p) - cv.dot(disk.center);
-    const T phi = atan2(q, s) * (0.5 * kInvPi);
-    at.uv = {sqrt(s * s + q * q), value(phi) < 0.0 ? T(phi + 1.0) : phi};
-  }
+  if (want_uv) at.uv = disk_uv(disk, at.p);
   return at;
 }
 
@@ -224,7 +254,6 @@ Interaction<T> interact_shape(const Disk& disk, std::uint32_t /*primitive*/, con
 template <Scalar T>
 Interaction<T> interact_shape(const Cylinder& cylinder, std::uint32_t primitive, const Ray<T>& ray,
                               bool want_uv) {
-  using std::atan2;
   using std::sqrt;
   const Vec3<T> oc = {ray.origin.x() - cylinder.base.x(), ray.origin.y() - cylinder.base.y(),
                       ray.origin.z() - cylinder.base.z()};
@@ -247,8 +276,7 @@ Interaction<T> interact_shape(const Cylinder& cylinder, std::uint32_t primitive,
   if (want_uv) {
     const Vec3d x = cylinder.to_local.row(0);
     const Vec3d y = cylinder.to_local.row(1);
-    const T phi = atan2(dot(y, n), dot(x, n)) * (0.5 * kInvPi);
-    at.uv = {value(phi) < 0.0 ? T(phi + 1.0) : phi, z * (1.0 / cylinder.length)};
+    at.uv = {azimuth_share(dot(x, n), dot(y, n)), z * (1.0 / cylinder.length)};
   }
   return at;
 }

@@ -17,6 +17,9 @@
 /// exchanged, and there is the factor (H24) besides. The emitter is at the end of that sweep, with
 /// x_bar the derivative by the point y and v_bar that by the emitted direction v:
 ///   area   both have their share of (H25)
+/// A textured emitter's radiance has the partials f_u, f_v by its uv (H37); where it is hit
+///   x_bar = (I - v n^T / n.v) (duv/dx)^T uv_bar,   v_bar = t x_bar,
+/// and as a block the point y has them in its y_bar.
 ///   spot   v_bar += (H23) for w = -v, with the opposite sign.
 #pragma once
 
@@ -53,6 +56,7 @@ class GradientSweep : RecordedPath<Rules> {
       x_bar = by.by_origin;
       v_bar = by.by_direction;
     }
+    if (topology_.end == PathEnd::Hit && emits_texture()) hit_texture(x_bar, v_bar);
     if (topology_.has_light_side()) {
       const Vec3d e_bar = joining_edge();
       light_side(e_bar, block);
@@ -94,6 +98,31 @@ class GradientSweep : RecordedPath<Rules> {
     return Rules::environment(*map, path_.last_v, path_.radiance, shares_.head<3>());
   }
 
+  // ---- Textured emitters ----
+
+  bool emits_texture() const {
+    const auto* light = std::get_if<AreaEmitter>(&this->emitter());
+    return light != nullptr && light->texture != nullptr;
+  }
+  /// By the point y.
+  Vec3d texture_adjoint(std::uint32_t primitive, const Vec3d& y) const {
+    const Geometry& geometry = this->emitter_shape().geometry;
+    const Vec3d n = this->surface_normal(geometry, primitive, y);
+    const auto surface = std::visit(
+        [&](const auto& shape) { return Rules::surface(shape, primitive, y, n, true); }, geometry);
+    return fold(path_.emission.u) * surface.u + fold(path_.emission.v) * surface.v;
+  }
+  /// By the last ray.
+  void hit_texture(Vec3d& x_bar, Vec3d& v_bar) const {
+    const Hit& hit = topology_.vertices[topology_.scatter_count].hit;
+    const Geometry& geometry = this->emitter_shape().geometry;
+    const Ray<double> ray = this->last_ray();
+    const Vec3d n = this->surface_normal(geometry, hit.primitive, path_.end);
+    const double cosine = Rules::hit_cosine(geometry, ray.origin, ray.direction, n);
+    x_bar = Rules::hit_adjoint(ray.direction, n, cosine, texture_adjoint(hit.primitive, path_.end));
+    v_bar = (path_.end - ray.origin).dot(ray.direction) * x_bar;
+  }
+
   /// The derivative by the edge e = y - x, given that by w_o; stores that by y.
   Vec3d connection(const Vertex& x, Vec3d w_bar, int& block) {
     if (topology_.end == PathEnd::DirectionalConnection) return Vec3d::Zero();
@@ -110,6 +139,7 @@ class GradientSweep : RecordedPath<Rules> {
     Vec3d y_bar = e_bar;
     if (const auto* sphere = std::get_if<Sphere>(&light.geometry))
       y_bar -= (sphere->flip_normals ? -inverse : inverse) / sphere->radius * x.wo;
+    if (emits_texture()) y_bar += texture_adjoint(0, path_.end);
     store(--block, y_bar);
     return e_bar;
   }
@@ -184,6 +214,7 @@ class GradientSweep : RecordedPath<Rules> {
     if (topology_.end == PathEnd::AreaEmission) {
       v_bar += Rules::log_cosine(path_.normal, path_.emitted);
       x_bar += this->emitter_curvature() * Rules::log_cosine(path_.emitted, path_.normal);
+      if (emits_texture()) x_bar += texture_adjoint(0, path_.start);
     } else if (const SpotEmitter* light = this->spot()) {
       v_bar -= Rules::spot(*light, Vec3d(-path_.emitted));
     }

@@ -40,6 +40,7 @@ struct Recorder : WalkVisitor<double> {
   double connection_cosine;  ///< of the emitter's normal
   Rgbd radiance{1, 1, 1};    ///< of an environment
   Rgbd color{1, 1, 1};       ///< of the whole path
+  FactorPartials emission;   ///< by uv, of a textured emitter
   // Of a light side.
   Vec3d start;    ///< where it begins
   Vec3d emitted;  ///< the direction there
@@ -92,6 +93,11 @@ struct Recorder : WalkVisitor<double> {
     color *= intensity(emitter);
   }
   void directional_connection(const DirectionalEmitter& emitter) { color *= emitter.irradiance; }
+  void emission_texture(const Texture& texture, const Vec2d& uv) {
+    if (!want_gradient) return;
+    Rules::add_texture(texture, uv, emission);
+    color *= emission.color;
+  }
 
   void leave_point(const Vec3d& y) { start = y; }
   void area_emission(const AreaEmitter& emitter, const Vec3d& n, const Vec3d& v) {
@@ -201,6 +207,16 @@ class RecordedPath {
     const auto* sphere = std::get_if<Sphere>(&emitter_shape().geometry);
     if (sphere == nullptr) return 0.0;
     return (sphere->flip_normals ? -1.0 : 1.0) / sphere->radius;
+  }
+
+  /// The outward normal of an emitter at a point.
+  static Vec3d surface_normal(const Geometry& geometry, std::uint32_t primitive, const Vec3d& p) {
+    if (const auto* sphere = std::get_if<Sphere>(&geometry))
+      return (p - sphere->center) / sphere->radius;
+    if (const auto* disk = std::get_if<Disk>(&geometry)) return disk->u.cross(disk->v).normalized();
+    if (const auto* cylinder = std::get_if<Cylinder>(&geometry))
+      return cylinder->across(Vec3d(p - cylinder->base)) / cylinder->radius;
+    return geometric_normal(std::get<TriangleMesh>(geometry), primitive);
   }
 
   // With a light side: the two ends of the joining edge.

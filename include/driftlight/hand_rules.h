@@ -25,6 +25,9 @@
 ///   Fresnel, metal      with S = a^2 + b^2, dS = 2 c D / S dc, da = c a / S dc           (H10)
 ///   Phong            log c_o + log(rho_d / pi + rho_s P(mu)), mu = 2 c_i c_o - m, P' = n P / mu
 ///                                                                                        (H11)
+///   Ward             log c_o + log(rho_d / pi + rho_s E), with C and h2 as of microfacets:
+///     dlog E = (dlog D / dC + 2 / C) dC - k (dc_i / c_i + dc_o / c_o),  k = 1/2 (Ward), 1 (Duer)
+///     dlog E = dlog D / dC dC - 2 / h2 dm                               balanced         (H38)
 ///   plastic          log c_o + log T(c_i) T(c_o), T = 1 - F, T' = -F'                   (H29)
 ///   rough plastic    log(rho_s E + a B), E = F D G / (4 c_i) as rough metal, B = c_o T(c_i)
 ///   T(c_o):
@@ -51,6 +54,7 @@
 ///                    log cos_y, cos_y = -n_y.w:  d = -(n_y.dw + w.dn_y) / cos_y          (H18)
 ///   spot             log falloff(-w):  -(d falloff / dv)(-w) / falloff . dw              (H23)
 ///   blurred lamp     log g (1 - q / 10)^3, as of BlurredAreaEmitter                       (H27)
+///   textured emitter log L(u, v):  (L_u du + L_v dv) / L, by add_texture                 (H37)
 /// Light side, w_i toward the emitter:
 ///   free             log |n_g.w_o| / |n_g.w_i|:
 ///                    (n_g.dw_o + w_o.dn_g) / n_g.w_o - (n_g.dw_i + w_i.dn_g) / n_g.w_i
@@ -98,8 +102,8 @@ struct SurfaceDifferential {
   }
 };
 
-/// The rules (H2) to (H18), (H23) to (H34). A class, so that a test can replace single ones by
-/// wrong ones.
+/// The rules (H2) to (H18), (H23) to (H34), (H37), (H38). A class, so that a test can replace
+/// single ones by wrong ones.
 struct HandRules {
   // ---- Microfacets ----
 
@@ -272,6 +276,32 @@ struct HandRules {
       f.cos_o.head<3>() = 2.0 * cos_i * d_mu;
       f.io.head<3>() = -d_mu;
     }
+    const Texture::Slopes d = b.diffuse_reflectance.slopes(uv);
+    const Texture::Slopes s = b.specular_reflectance.slopes(uv);
+    f.u.head<3>() = log_slope(d.u * kInvPi + s.u * lobe, f.color);
+    f.v.head<3>() = log_slope(d.v * kInvPi + s.v * lobe, f.color);
+    return f;
+  }
+
+  /// (H38)
+  static FactorPartials scatter(const Ward& b, double cos_i, double cos_o, double io,
+                                const Vec2d& uv, Scattering) {
+    FactorPartials f;
+    f.cos_o[3] = 1.0 / cos_o;
+    const double lobe = detail::ward_lobe(b, cos_i, cos_o, io);
+    const Rgbd specular = b.specular_reflectance.eval(uv) * lobe;
+    f.color = b.diffuse_reflectance.eval(uv) * kInvPi + specular;
+    const bool balanced = b.variant == Ward::Variant::Balanced;
+    const double k = balanced ? 0.0 : b.variant == Ward::Variant::Ward ? 0.5 : 1.0;
+    const double h2 = 2.0 + 2.0 * io;
+    const double root = cos_i + cos_o;
+    const double cos2 = root * root / h2;
+    const double by_cos2 = d_log_d(b.microfacets(), cos2) + (balanced ? 0.0 : 2.0 / cos2);
+    const double by_root = by_cos2 * 2.0 * root / h2;
+    f.cos_i.head<3>() = log_slope(specular * (by_root - k / cos_i), f.color);
+    f.cos_o.head<3>() = log_slope(specular * (by_root - k / cos_o), f.color);
+    f.io.head<3>() =
+        log_slope(specular * (-2.0 * (by_cos2 * cos2 + (balanced ? 1.0 : 0.0)) / h2), f.color);
     const Texture::Slopes d = b.diffuse_reflectance.slopes(uv);
     const Texture::Slopes s = b.specular_reflectance.slopes(uv);
     f.u.head<3>() = log_slope(d.u * kInvPi + s.u * lobe, f.color);

@@ -383,6 +383,18 @@ class StageSweep : RecordedPath<Rules> {
     if (part < 1.0) diffuse(x, dwo, dn, share * (1.0 - part));
   }
 
+  /// (H21) with (H19) in the place of the mirror direction
+  void constrain(const Ward& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
+                 const Columns& dn, double share) {
+    const double lobe = detail::ward_lobe(b, x.cos_i, x.cos_o, x.io);
+    const double glossy = luminance(b.specular_reflectance.eval(x.uv)) * lobe;
+    const double matt = luminance(b.diffuse_reflectance.eval(x.uv)) * kInvPi;
+    if (!(glossy + matt > 0.0)) return;
+    const double part = glossy / (glossy + matt);
+    if (part > 0.0) slopes(b.microfacets(), 1.0, x, dwi, dwo, dn, share * part);
+    if (part < 1.0) diffuse(x, dwo, dn, share * (1.0 - part));
+  }
+
   void constrain(const ThinDielectric&, const Vertex&, const Columns&, const Columns&,
                  const Columns&, double) {}
   void constrain(const Plastic&, const Vertex& x, const Columns&, const Columns& dwo,
@@ -441,7 +453,7 @@ class StageSweep : RecordedPath<Rules> {
     const Shape& shape = scene_.shapes()[hit_at.shape];
     const auto [from, v] = this->last_ray();
     const double length = (path_.end - from).dot(v);
-    const Vec3d n = surface_normal(shape.geometry, hit_at.primitive, path_.end);
+    const Vec3d n = this->surface_normal(shape.geometry, hit_at.primitive, path_.end);
     const double cosine = Rules::hit_cosine(shape.geometry, from, v, n);
     position(shape, hit(v, n, cosine, length));
   }
@@ -460,15 +472,6 @@ class StageSweep : RecordedPath<Rules> {
     const Vec3d variance = lamp.approach(ray).variance;
     for (int i = 0; i < 3; ++i)
       add(1.0 / (3.0 * std::sqrt(variance[i])) * dot(Vec3d(lamp.axes().row(i)), dy));
-  }
-
-  static Vec3d surface_normal(const Geometry& geometry, std::uint32_t primitive, const Vec3d& p) {
-    if (const auto* sphere = std::get_if<Sphere>(&geometry))
-      return (p - sphere->center) / sphere->radius;
-    if (const auto* disk = std::get_if<Disk>(&geometry)) return disk->u.cross(disk->v).normalized();
-    if (const auto* cylinder = std::get_if<Cylinder>(&geometry))
-      return cylinder->across(Vec3d(p - cylinder->base)) / cylinder->radius;
-    return geometric_normal(std::get<TriangleMesh>(geometry), primitive);
   }
 
   LocalColumns columns_ = kSensorColumns;

@@ -23,7 +23,8 @@ enum class TraceStatus : std::uint8_t {
   Occluded,   ///< the connection, or the way to the environment, is blocked
 };
 
-/// True if points on an area emitter of this shape can be coordinates: planar ones and spheres.
+/// True if points on an area emitter of this shape can be coordinates: planar ones, unless their
+/// texture is bent, and spheres.
 bool has_points(const Shape& emitter);
 
 /// True if a path whose last scattering vertex has this lobe reaches the area emitter through a

@@ -43,7 +43,9 @@ struct Shape {
   std::uint32_t material = 0;
   std::optional<std::uint32_t> emitter;
   ShapeExtent extent;
-  bool textured = false;                 ///< something of the material looks at uv
+  bool textured = false;  ///< something of the material or of the emission looks at uv
+  /// The emission looks at the uv of a mesh that are not one linear function of the point.
+  bool bent_emission = false;
   std::shared_ptr<const Relief> relief;  ///< of the material; only of meshes
   DiscreteDistribution triangles;        ///< by area; only for meshes that emit
 };
@@ -54,6 +56,7 @@ struct EmitterPointOf {
   Vec3<T> p = constant<T>(Vec3d(Vec3d::Zero()));
   /// Unit normal on the emitting side; zero for points and spots.
   Vec3<T> n = constant<T>(Vec3d(Vec3d::Zero()));
+  Vec2<T> uv = constant<T>(Vec2d(Vec2d::Zero()));  ///< zero if the emitter is not textured
 };
 using EmitterPoint = EmitterPointOf<double>;
 
@@ -158,6 +161,8 @@ class SceneBuilder {
   /// indices are out of range, and if the material has a relief that the shape cannot carry.
   std::uint32_t add_shape(Geometry geometry, std::uint32_t material,
                           std::optional<Rgbd> radiance = std::nullopt);
+  /// Likewise where the radiance varies over the shape.
+  std::uint32_t add_shape(Geometry geometry, std::uint32_t material, const Texture& radiance);
   void add_emitter(PointEmitter emitter);
   void add_emitter(SpotEmitter emitter);
   void add_emitter(DirectionalEmitter emitter);

@@ -53,6 +53,10 @@ struct WalkVisitor {
   void point_connection(const Emitter&, const Vec3<T>& /*wo*/, const T& /*r2*/) {}
   void directional_connection(const DirectionalEmitter&) {}
 
+  /// The radiance of an area emitter over `radiance`, if it has a texture: after `hit`,
+  /// `area_connection` or `area_emission`.
+  void emission_texture(const Texture&, const Vec2<T>& /*uv*/) {}
+
   // Of paths with a light side, whose walk is: the sensor's side up to the vertex before the last,
   // the light side likewise, and then the two last vertices with the edge that joins them.
 
@@ -89,6 +93,19 @@ Vec3<T> emitter_normal(const Shape& shape, const Vec3<T>& y) {
   if (const auto* disk = std::get_if<Disk>(&shape.geometry))
     return constant<T>(Vec3d(disk->u.cross(disk->v).normalized()));
   return constant<T>(geometric_normal(std::get<TriangleMesh>(shape.geometry), 0));
+}
+
+/// Texture coordinates of such an emitter there.
+template <Scalar T>
+Vec2<T> emitter_uv(const Shape& shape, const Vec3<T>& y) {
+  if (const auto* sphere = std::get_if<Sphere>(&shape.geometry)) {
+    const double s = 1.0 / sphere->radius;
+    const Vec3<T> n{(y.x() - sphere->center.x()) * s, (y.y() - sphere->center.y()) * s,
+                    (y.z() - sphere->center.z()) * s};
+    return sphere_uv(*sphere, n);
+  }
+  if (const auto* disk = std::get_if<Disk>(&shape.geometry)) return disk_uv(*disk, y);
+  return triangle_uv(std::get<TriangleMesh>(shape.geometry), 0, y);
 }
 
 /// A vertex that a ray has come to: w points back along the ray.
@@ -135,6 +152,15 @@ Vec3<T> normal_at_end(const Blocks& blocks, const Shape& shape, const Vec3<T>& y
     return blocks.emitter_normal();
   else
     return emitter_normal(shape, y);
+}
+
+/// Likewise its texture coordinates.
+template <Scalar T, class Blocks>
+Vec2<T> uv_at_end(const Blocks& blocks, const Shape& shape, const Vec3<T>& y) {
+  if constexpr (requires { blocks.emitter_uv(); })
+    return blocks.emitter_uv();
+  else
+    return emitter_uv(shape, y);
 }
 
 /// The ray that leaves the sensor, v its coordinate.
@@ -236,6 +262,8 @@ class TwoSidedWalk {
     const Vec3<T> normal = normal_at_end(blocks_, shape, y);
     Ray<T> ray{y, blocks_(next_block_++)};
     visitor_.area_emission(light, normal, ray.direction);
+    if (light.texture != nullptr)
+      visitor_.emission_texture(*light.texture, uv_at_end(blocks_, shape, y));
     visitor_.depart(ray, normal);
     return ray;
   }
@@ -286,7 +314,7 @@ class TwoSidedWalk {
 
 /// Walks the path. `blocks(k)` gives block k as Vec3<T> (see PathCoordinates); each is asked for
 /// once, in order. Where it exists, `blocks(k, x)` is asked for the free direction at the vertex x,
-/// and `blocks.emitter_normal()` for the normal at the emitter point.
+/// and `blocks.emitter_normal()` and `blocks.emitter_uv()` for what is at the emitter point.
 ///
 /// A path with PathEnd::Environment and a light side has two blocks for the emitted ray, a point on
 /// it and its direction along the light. No chart has such paths, but the strategies of
@@ -336,6 +364,8 @@ void walk(const Scene& scene, const PathTopology& topology, const Blocks& blocks
       const Shape& light_shape = scene.shapes()[light.shape];
       visitor.position(light_shape, y);
       visitor.area_connection(light, -dot(normal_at_end(blocks, light_shape, y), wo), r2);
+      if (light.texture != nullptr)
+        visitor.emission_texture(*light.texture, uv_at_end(blocks, light_shape, y));
     } else {
       visitor.point_connection(emitter, wo, r2);
     }
@@ -355,7 +385,9 @@ void walk(const Scene& scene, const PathTopology& topology, const Blocks& blocks
   const Interaction<T> at = scene.interact(last.hit, ray);
   visitor.position(scene.shapes()[last.hit.shape], at.p);
   const Vec3<T> edge = at.p - ray.origin;
-  visitor.hit(std::get<AreaEmitter>(emitter), -dot(at.n_g, ray.direction), dot(edge, edge));
+  const auto& light = std::get<AreaEmitter>(emitter);
+  visitor.hit(light, -dot(at.n_g, ray.direction), dot(edge, edge));
+  if (light.texture != nullptr) visitor.emission_texture(*light.texture, at.uv);
 }
 
 }  // namespace driftlight

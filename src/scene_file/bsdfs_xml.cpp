@@ -139,6 +139,22 @@ Bsdf read_phong(Properties& properties, LoadContext& context) {
   return bsdf;
 }
 
+Bsdf read_ward(Properties& properties, LoadContext& context) {
+  Ward bsdf;
+  const std::string variant =
+      properties.choice("variant", "balanced", {"ward", "ward-duer", "balanced"});
+  bsdf.variant = variant == "ward"        ? Ward::Variant::Ward
+                 : variant == "ward-duer" ? Ward::Variant::Duer
+                                          : Ward::Variant::Balanced;
+  bsdf.alpha = read_alpha(properties, context);
+  bsdf.diffuse_reflectance =
+      read_textured(properties, "diffuseReflectance", Rgbd::Constant(0.5), context);
+  bsdf.specular_reflectance =
+      read_textured(properties, "specularReflectance", Rgbd::Constant(0.2), context);
+  conserve_energy(properties, context, {&bsdf.diffuse_reflectance, &bsdf.specular_reflectance});
+  return bsdf;
+}
+
 /// Fills in what smooth and rough plastics have in common; `make` takes eta, diffuse and specular
 /// reflectance, and `nonlinear`.
 template <class Make>
@@ -328,13 +344,14 @@ Surface one_sided(Properties& properties, LoadContext& context) {
 }
 
 using BsdfReader = Surface (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, BsdfReader>, 16> kBsdfs{{
+constexpr std::array<std::pair<std::string_view, BsdfReader>, 17> kBsdfs{{
     {"diffuse", &one_sided<read_diffuse>},
     {"conductor", &one_sided<read_conductor>},
     {"roughconductor", &one_sided<read_rough_conductor>},
     {"dielectric", &one_sided<read_dielectric>},
     {"roughdielectric", &one_sided<read_rough_dielectric>},
     {"phong", &one_sided<read_phong>},
+    {"ward", &one_sided<read_ward>},
     {"plastic", &one_sided<read_plastic>},
     {"roughplastic", &one_sided<read_rough_plastic>},
     {"thindielectric", &one_sided<read_thin_dielectric>},

@@ -246,11 +246,11 @@ void read_emitter(const Element& element, LoadContext& context) {
   context.objects.define(element, NamedObjects::Other{});
 }
 
-Rgbd read_area_radiance(const Element& element, LoadContext& context) {
+Texture read_area_radiance(const Element& element, LoadContext& context) {
   Properties properties(element);
   if (properties.type() != "area")
     element.fail("unknown " + properties.description() + " in a shape; valid are: area");
-  const Rgbd radiance = properties.color("radiance", kWhite);
+  const Texture radiance = read_textured(properties, "radiance", kWhite, context);
   properties.ignore({"samplingWeight"});
   properties.finish();
   context.objects.define(element, NamedObjects::Other{});

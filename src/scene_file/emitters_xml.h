@@ -10,6 +10,6 @@ namespace driftlight {
 void read_emitter(const Element& element, LoadContext& context);
 
 /// Radiance of an <emitter type="area"> inside of a shape.
-Rgbd read_area_radiance(const Element& element, LoadContext& context);
+Texture read_area_radiance(const Element& element, LoadContext& context);
 
 }  // namespace driftlight

@@ -27,13 +27,15 @@ struct Surface {
   std::shared_ptr<const Relief> relief = nullptr;
 };
 
+/// What a <shape> consists of.
+struct ShapePart {
+  Geometry geometry;
+  std::shared_ptr<Surface> surface = nullptr;
+};
+
 /// What a <shape type="shapegroup"> stands for, in its own space.
 struct ShapeGroup {
-  struct Part {
-    Geometry geometry;
-    std::shared_ptr<Surface> surface;
-  };
-  std::vector<Part> parts;
+  std::vector<ShapePart> parts;
   std::size_t triangles = 0;
 };
 

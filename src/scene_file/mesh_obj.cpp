@@ -36,14 +36,15 @@ class ObjReader {
   void start_group() {
     if (!options_.one_mesh) finish_mesh();
   }
-  void start_material() {
-    file_.names_materials = true;
+  void start_material(const std::string& name) {
     start_group();
+    material_ = name.substr(0, name.find_last_not_of(" \t\r") + 1);
   }
+  void set_library(const std::string& name) { file_.library = name; }
 
   ObjFile take() {
     finish_mesh();
-    if (file_.meshes.empty()) throw InputError("the file has no faces");
+    if (file_.parts.empty()) throw InputError("the file has no faces");
     return std::move(file_);
   }
 
@@ -90,7 +91,7 @@ class ObjReader {
     if (!has_normals_) mesh_.normals.clear();
     if (!has_uvs_) mesh_.uvs.clear();
     check_mesh(mesh_);
-    file_.meshes.push_back(std::move(mesh_));
+    file_.parts.push_back({std::move(mesh_), material_});
     mesh_ = {};
     vertices_.clear();
     has_normals_ = lacks_normals_ = has_uvs_ = false;
@@ -102,6 +103,7 @@ class ObjReader {
   std::vector<Eigen::Vector2f> uvs_;
   ObjFile file_;
   TriangleMesh mesh_;
+  std::string material_;
   std::map<Key, std::uint32_t> vertices_;
   bool has_normals_ = false;
   bool lacks_normals_ = false;
@@ -123,9 +125,23 @@ tinyobj::callback_t callbacks() {
     reader(data).add_polygon(corners, count);
   };
   result.group_cb = [](void* data, const char**, int) { reader(data).start_group(); };
-  result.usemtl_cb = [](void* data, const char*, int) { reader(data).start_material(); };
+  result.usemtl_cb = [](void* data, const char* name, int) { reader(data).start_material(name); };
   return result;
 }
+
+/// Notes the names of .mtl files and reads none.
+class LibraryNames : public tinyobj::MaterialReader {
+ public:
+  explicit LibraryNames(ObjReader& reader) : reader_(reader) {}
+  bool operator()(const std::string& name, std::vector<tinyobj::material_t>*,
+                  std::map<std::string, int>*, std::string*, std::string*) override {
+    reader_.set_library(name);
+    return true;
+  }
+
+ private:
+  ObjReader& reader_;
+};
 
 }  // namespace
 
@@ -135,7 +151,8 @@ ObjFile read_obj(const std::filesystem::path& file, const ObjOptions& options) {
     throw InputError("the mesh '" + file.string() + "' cannot be opened");
   try {
     ObjReader reader(options);
-    tinyobj::LoadObjWithCallback(stream, callbacks(), &reader);
+    LibraryNames libraries(reader);
+    tinyobj::LoadObjWithCallback(stream, callbacks(), &reader, &libraries);
     return reader.take();
   } catch (const InputError& error) {
     throw InputError("the mesh '" + file.string() + "' is not usable: " + error.what());

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "driftlight/scene.h"
@@ -10,10 +11,13 @@
 namespace driftlight {
 
 struct ObjFile {
-  /// In object space, one for every group ("g" or "usemtl") with faces, as Mitsuba splits them.
-  std::vector<TriangleMesh> meshes;
-  /// The file asks for materials of an .mtl file, which is not read.
-  bool names_materials = false;
+  /// A group ("g" or "usemtl") with faces, as Mitsuba splits them, in object space.
+  struct Part {
+    TriangleMesh mesh;
+    std::string material;  ///< empty if it names none
+  };
+  std::vector<Part> parts;
+  std::string library;  ///< the last .mtl file that it names, if any
 };
 
 struct ObjOptions {

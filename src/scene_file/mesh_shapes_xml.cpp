@@ -2,7 +2,10 @@
 #include <fmt/format.h>
 
 #include <Eigen/LU>
+#include <algorithm>
+#include <filesystem>
 
+#include "material_library.h"
 #include "mesh.h"
 #include "mesh_obj.h"
 #include "mesh_ply.h"
@@ -33,35 +36,70 @@ void finish_mesh(Properties& properties, TriangleMesh& mesh, Mirrored mirrored) 
 
 }  // namespace
 
-std::vector<Geometry> read_obj_shape(Properties& properties, LoadContext&,
-                                     const Attachments& attachments) {
+namespace {
+
+/// A file named in an obj file, beside it or among those of the scene.
+std::filesystem::path find_beside(const std::filesystem::path& obj, const std::string& name,
+                                  const Element& element) {
+  const std::filesystem::path beside = obj.parent_path() / name;
+  return std::filesystem::exists(beside) ? beside : element.find_file(name);
+}
+
+/// The surfaces of the file's materials: those of its library, unless the scene has its own.
+MaterialLibrary read_materials(const std::filesystem::path& obj, const ObjFile& file, bool load,
+                               const Attachments& attachments, const Element& element,
+                               LoadContext& context) {
+  MaterialLibrary result;
+  if (load && !file.library.empty() && !attachments.surface) {
+    const std::filesystem::path library = find_beside(obj, file.library, element);
+    if (std::filesystem::exists(library))
+      result = read_material_library(library, element, context);
+    else
+      context.notice(element, "the materials '" + file.library + "' of '" + obj.string() +
+                                  "' cannot be found; what has no bsdf is grey, as in Mitsuba");
+  }
+  for (const auto& [name, surface] : attachments.by_material) {
+    const bool occurs =
+        std::any_of(file.parts.begin(), file.parts.end(),
+                    [&](const ObjFile::Part& part) { return part.material == name; });
+    if (!occurs)
+      context.notice(element,
+                     "no face of '" + obj.string() + "' is of the material '" + name + "'");
+    result[name] = surface;
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<ShapePart> read_obj_shape(Properties& properties, LoadContext& context,
+                                      const Attachments& attachments) {
   const std::string name = properties.required_text("filename");
   // Mitsuba 3 knows neither groups nor materials of obj files.
   const bool plain = properties.dialect() == Dialect::Mitsuba3;
   const ObjOptions options{.one_mesh = plain || properties.boolean("collapse", false),
                            .flip_tex_coords = properties.boolean("flipTexCoords", true)};
   const bool load_materials = !plain && properties.boolean("loadMaterials", true);
-  ObjFile file = with_location(properties.element(), [&] {
-    return read_obj(properties.element().find_file(name), options);
-  });
-  if (file.names_materials && load_materials && !attachments.surface)
-    properties.element().fail("'" + name +
-                              "' names materials of an .mtl file, which is not read; "
-                              "give the shape a bsdf, or set 'loadMaterials' to false");
-  if (attachments.radiance && file.meshes.size() > 1)
+  const std::filesystem::path path = properties.element().find_file(name);
+  ObjFile file = with_location(properties.element(), [&] { return read_obj(path, options); });
+  const MaterialLibrary materials =
+      read_materials(path, file, load_materials, attachments, properties.element(), context);
+  if (attachments.radiance && file.parts.size() > 1)
     properties.element().fail("'" + name +
                               "' has several groups and cannot be an emitter; set "
                               "'collapse' to true");
-  std::vector<Geometry> result;
-  for (TriangleMesh& mesh : file.meshes) {
-    finish_mesh(properties, mesh, Mirrored::TurnsInsideOut);
-    result.emplace_back(std::move(mesh));
+  std::vector<ShapePart> result;
+  for (ObjFile::Part& part : file.parts) {
+    finish_mesh(properties, part.mesh, Mirrored::TurnsInsideOut);
+    const auto material = materials.find(part.material);
+    result.push_back({std::move(part.mesh),
+                      material != materials.end() ? material->second : attachments.surface});
   }
   return result;
 }
 
-std::vector<Geometry> read_ply_shape(Properties& properties, LoadContext& context,
-                                     const Attachments&) {
+std::vector<ShapePart> read_ply_shape(Properties& properties, LoadContext& context,
+                                      const Attachments&) {
   const std::string name = properties.required_text("filename");
   const bool flip = properties.boolean("flipTexCoords", false);
   properties.ignore({"srgb"});  // of the colours, which no texture here looks at
@@ -73,18 +111,18 @@ std::vector<Geometry> read_ply_shape(Properties& properties, LoadContext& contex
     context.notice(properties.element(), fmt::format("'{}' has properties that are not used: {}",
                                                      name, join(file.unused)));
   finish_mesh(properties, file.mesh, Mirrored::TurnsInsideOut);
-  return {std::move(file.mesh)};
+  return {{std::move(file.mesh)}};
 }
 
-std::vector<Geometry> read_serialized_shape(Properties& properties, LoadContext&,
-                                            const Attachments&) {
+std::vector<ShapePart> read_serialized_shape(Properties& properties, LoadContext&,
+                                             const Attachments&) {
   const std::string name = properties.required_text("filename");
   const int index = properties.integer("shapeIndex", 0);
   TriangleMesh mesh = with_location(properties.element(), [&] {
     return read_serialized(properties.element().find_file(name), index);
   });
   finish_mesh(properties, mesh, Mirrored::KeepsOutside);
-  return {std::move(mesh)};
+  return {{std::move(mesh)}};
 }
 
 }  // namespace driftlight

@@ -38,10 +38,13 @@ constexpr std::array<std::pair<std::string_view, ShapeReader>, 10> kShapes{{
 Attachments read_attachments(Properties& properties, LoadContext& context) {
   Attachments result;
   for (const Element& element : properties.nested({"bsdf", "ref"})) {
+    const std::string material = element.find("name").value_or("");
+    if (properties.type() == "obj" && !material.empty() &&
+        element.dialect() == Dialect::Mitsuba06) {
+      result.by_material[material] = read_surface(element, context);
+      continue;
+    }
     if (result.surface) element.fail("a second bsdf of the shape");
-    const bool by_material = properties.type() == "obj" && element.find("name");
-    if (by_material && element.dialect() == Dialect::Mitsuba06)
-      element.fail("bsdfs for single materials of an obj file are not supported");
     result.surface = read_surface(element, context);
   }
   for (const Element& element : properties.nested({"emitter"})) {
@@ -58,28 +61,33 @@ std::shared_ptr<Surface> default_surface(const Attachments& attachments) {
       Surface{Diffuse{Texture(reflectance)}, std::nullopt, std::nullopt});
 }
 
-/// A shape as its reader leaves it.
+/// A shape as its reader leaves it; all parts have a surface.
 struct ShapeParts {
-  std::vector<Geometry> geometries;
-  std::shared_ptr<Surface> surface;
-  std::optional<Rgbd> radiance;
+  std::vector<ShapePart> parts;
+  std::optional<Texture> radiance;
 };
 
 ShapeParts read_parts(Properties& properties, LoadContext& context, ShapeReader reader) {
   Attachments attachments = read_attachments(properties, context);
-  ShapeParts parts{reader(properties, context, attachments), attachments.surface,
-                   attachments.radiance};
+  ShapeParts shape{reader(properties, context, attachments), attachments.radiance};
   properties.finish();
-  if (!parts.surface) parts.surface = default_surface(attachments);
-  if (parts.radiance && parts.radiance->maxCoeff() == 0.0) parts.radiance.reset();
-  return parts;
+  const std::shared_ptr<Surface> common =
+      attachments.surface ? attachments.surface : default_surface(attachments);
+  for (ShapePart& part : shape.parts)
+    if (!part.surface) part.surface = common;
+  if (shape.radiance && shape.radiance->maximum() == 0.0) shape.radiance.reset();
+  return shape;
 }
 
 void add_shape(const Element& element, Geometry geometry, Surface& surface,
-               const std::optional<Rgbd>& radiance, LoadContext& context) {
+               const std::optional<Texture>& radiance, LoadContext& context) {
   const std::uint32_t material = material_index(surface, context);
-  with_location(element,
-                [&] { context.builder.add_shape(std::move(geometry), material, radiance); });
+  with_location(element, [&] {
+    if (radiance)
+      context.builder.add_shape(std::move(geometry), material, *radiance);
+    else
+      context.builder.add_shape(std::move(geometry), material);
+  });
   if (++context.shape_count > kMaximumShapes)
     element.fail(fmt::format("the scene has more than {} shapes", kMaximumShapes));
 }
@@ -91,12 +99,12 @@ std::shared_ptr<const ShapeGroup> read_group(Properties& properties, LoadContext
     Properties nested(element);
     const ShapeReader reader = find_plugin(kShapes, nested);
     if (reader == nullptr) element.fail("instances and shapegroups cannot be nested");
-    const ShapeParts parts = read_parts(nested, context, reader);
-    if (parts.radiance) element.fail("an emitter cannot be part of a shapegroup");
-    for (const Geometry& geometry : parts.geometries) {
-      const auto* mesh = std::get_if<TriangleMesh>(&geometry);
+    const ShapeParts shape = read_parts(nested, context, reader);
+    if (shape.radiance) element.fail("an emitter cannot be part of a shapegroup");
+    for (const ShapePart& part : shape.parts) {
+      const auto* mesh = std::get_if<TriangleMesh>(&part.geometry);
       if (mesh != nullptr) group->triangles += mesh->triangles.size();
-      group->parts.push_back({geometry, parts.surface});
+      group->parts.push_back(part);
     }
     context.objects.define(element, NamedObjects::Other{});
   }
@@ -111,7 +119,7 @@ std::shared_ptr<const ShapeGroup> read_group(Properties& properties, LoadContext
   return group;
 }
 
-bool is_mirrored_texture(const ShapeGroup::Part& part, const Eigen::Affine3d& to_world) {
+bool is_mirrored_texture(const ShapePart& part, const Eigen::Affine3d& to_world) {
   return std::holds_alternative<Disk>(part.geometry) && is_textured(*part.surface) &&
          to_world.linear().determinant() < 0.0;
 }
@@ -130,7 +138,7 @@ void add_instance(Properties& properties, LoadContext& context) {
   if (context.instanced_triangles > kMaximumInstanced)
     element.fail(
         fmt::format("the instances have more than {} triangles, each a copy", kMaximumInstanced));
-  for (const ShapeGroup::Part& part : group->parts) {
+  for (const ShapePart& part : group->parts) {
     if (is_mirrored_texture(part, to_world))
       properties.fail("toWorld", "a mirrored disk cannot carry a texture");
     std::visit(
@@ -158,9 +166,9 @@ void read_shape(const Element& element, LoadContext& context) {
   if (reader == nullptr) {
     add_instance(properties, context);
   } else {
-    ShapeParts parts = read_parts(properties, context, reader);
-    for (Geometry& geometry : parts.geometries)
-      add_shape(element, std::move(geometry), *parts.surface, parts.radiance, context);
+    ShapeParts shape = read_parts(properties, context, reader);
+    for (ShapePart& part : shape.parts)
+      add_shape(element, std::move(part.geometry), *part.surface, shape.radiance, context);
   }
   context.objects.define(element, NamedObjects::Other{});
 }

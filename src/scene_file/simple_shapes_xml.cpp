@@ -41,16 +41,16 @@ Vec3d first_direction(const Vec3d& axis, Dialect dialect) {
 
 }  // namespace
 
-std::vector<Geometry> read_rectangle(Properties& properties, LoadContext&, const Attachments&) {
+std::vector<ShapePart> read_rectangle(Properties& properties, LoadContext&, const Attachments&) {
   const Quad quad{{Vec3d(-1, -1, 0), Vec3d(1, -1, 0), Vec3d(1, 1, 0), Vec3d(-1, 1, 0)},
                   {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}}};
   TriangleMesh mesh;
   append_quad(mesh, quad, properties.transform("toWorld"),
               properties.boolean("flipNormals", false));
-  return {mesh};
+  return {{mesh}};
 }
 
-std::vector<Geometry> read_cube(Properties& properties, LoadContext&, const Attachments&) {
+std::vector<ShapePart> read_cube(Properties& properties, LoadContext&, const Attachments&) {
   const std::array<Eigen::Vector2f, 4> uvs{{{0, 1}, {1, 1}, {1, 0}, {0, 0}}};
   const std::array<std::array<Vec3d, 4>, 6> faces{{
       {Vec3d(1, -1, -1), Vec3d(1, -1, 1), Vec3d(-1, -1, 1), Vec3d(-1, -1, -1)},
@@ -64,10 +64,10 @@ std::vector<Geometry> read_cube(Properties& properties, LoadContext&, const Atta
   const bool flip = properties.boolean("flipNormals", false);
   TriangleMesh mesh;
   for (const auto& corners : faces) append_quad(mesh, {corners, uvs}, to_world, flip);
-  return {mesh};
+  return {{mesh}};
 }
 
-std::vector<Geometry> read_sphere(Properties& properties, LoadContext&, const Attachments&) {
+std::vector<ShapePart> read_sphere(Properties& properties, LoadContext&, const Attachments&) {
   const Eigen::Affine3d to_world = properties.transform("toWorld");
   const double factor = std::cbrt(std::abs(to_world.linear().determinant()));
   const Eigen::Matrix3d rotation = to_world.linear() / factor;
@@ -81,23 +81,23 @@ std::vector<Geometry> read_sphere(Properties& properties, LoadContext&, const At
   sphere.radius = factor * properties.positive("radius", 1.0);
   sphere.to_local = rotation.inverse();
   sphere.flip_normals = properties.boolean("flipNormals", false);
-  return {sphere};
+  return {{sphere}};
 }
 
-std::vector<Geometry> read_disk(Properties& properties, LoadContext&,
-                                const Attachments& attachments) {
+std::vector<ShapePart> read_disk(Properties& properties, LoadContext&,
+                                 const Attachments& attachments) {
   const Eigen::Affine3d to_world = properties.transform("toWorld");
   const bool flip = properties.boolean("flipNormals", false);
   Disk disk{to_world.translation(), to_world.linear().col(0), to_world.linear().col(1)};
-  if ((to_world.linear().determinant() < 0.0) == flip) return {disk};
+  if ((to_world.linear().determinant() < 0.0) == flip) return {{disk}};
   // Turning v turns the normal, and with it the texture coordinates, which should stay.
   if (attachments.surface && is_textured(*attachments.surface))
     properties.element().fail("a disk that is flipped or mirrored cannot carry a texture");
   disk.v = -disk.v;
-  return {disk};
+  return {{disk}};
 }
 
-std::vector<Geometry> read_cylinder(Properties& properties, LoadContext&, const Attachments&) {
+std::vector<ShapePart> read_cylinder(Properties& properties, LoadContext&, const Attachments&) {
   const Vec3d p0 = properties.point("p0").value_or(Vec3d(0, 0, 0));
   const Vec3d p1 = properties.point("p1").value_or(Vec3d(0, 0, 1));
   if (!((p1 - p0).norm() > 0.0)) properties.fail("p1", "must not be 'p0'");
@@ -112,7 +112,7 @@ std::vector<Geometry> read_cylinder(Properties& properties, LoadContext&, const 
   const auto moved = transformed(cylinder, properties.transform("toWorld"));
   if (!moved)
     properties.fail("toWorld", "a cylinder must be scaled evenly across its axis, and not sheared");
-  return {*moved};
+  return {{*moved}};
 }
 
 }  // namespace driftlight

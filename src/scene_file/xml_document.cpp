@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <utility>
 
 #include "text.h"
 
@@ -32,8 +33,10 @@ struct DepthProbe : pugi::xml_tree_walker {
 
 }  // namespace
 
-XmlDocument::XmlDocument(const std::filesystem::path& file)
-    : name_(file.string()), text_(read_text(file)) {
+XmlDocument::XmlDocument(const std::filesystem::path& file) : XmlDocument(file, read_text(file)) {}
+
+XmlDocument::XmlDocument(const std::filesystem::path& file, std::string text)
+    : name_(file.string()), text_(std::move(text)) {
   const pugi::xml_parse_result result =
       document_.load_buffer(text_.data(), text_.size(), pugi::parse_default, pugi::encoding_utf8);
   if (!result)

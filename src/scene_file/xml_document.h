@@ -25,6 +25,8 @@ class XmlDocument {
   /// Throws SceneError if the file cannot be read, is not well-formed, has not exactly one
   /// outermost element, or is nested deeper than any scene needs.
   explicit XmlDocument(const std::filesystem::path& file);
+  /// The same of a text that stands for the file.
+  XmlDocument(const std::filesystem::path& file, std::string text);
   XmlDocument(const XmlDocument&) = delete;
   XmlDocument& operator=(const XmlDocument&) = delete;
 

@@ -29,6 +29,8 @@ const std::vector<std::string>& required_classes() {
       "rough dielectric ggx transmission inside",
       "phong glossy lobe",
       "phong diffuse lobe",
+      "ward glossy lobe",
+      "ward diffuse lobe",
       "plastic coat",
       "plastic base",
       "rough plastic beckmann coat",

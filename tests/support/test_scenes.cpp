@@ -205,9 +205,10 @@ Scene room() {
   make->add_shape(Disk{{-0.2, 0.02, 1.0}, {0.5, 0, 0}, {0, 0.1, -0.5}}, glossy);
 
   const auto black = make.one_sided(Diffuse{gray(0.0)});
-  make->add_shape(quad({-0.5, 2.98, -0.5}, {1, 0, 0}, {0, 0, 1}), black, Rgbd{6, 5, 4});
-  make->add_shape(Disk{{-1.98, 1.8, 0.3}, {0, 0.35, 0}, {0, 0, 0.4}}, black, Rgbd{4, 5, 6});
-  make->add_shape(sphere_at({1.4, 2.0, -1.2}, 0.3), plain, Rgbd{5, 5, 3});
+  make->add_shape(quad({-0.5, 2.98, -0.5}, {1, 0, 0}, {0, 0, 1}, true), black,
+                  textured(8, 2.0, 8.0));
+  make->add_shape(Disk{{-1.98, 1.8, 0.3}, {0, 0.35, 0}, {0, 0, 0.4}}, black, textured(6, 3.0, 7.0));
+  make->add_shape(sphere_at({1.4, 2.0, -1.2}, 0.3), plain, textured(8, 3.0, 6.0));
   make->add_shape(round_mesh({-1.3, 1.9, -1.3}, 0.35, 4), plain, Rgbd{3, 4, 5});
   make->set_camera(look_at({0, 1.4, 3.4}, {0, 1.1, 0}, 0.55));
   return make->build();
@@ -349,14 +350,16 @@ Scene plan(bool with_caustics) {
   const auto floor = make.one_sided(Phong{textured(8, 0.2, 0.6), gray(0.3), 15}, tilts());
   add_walls(make, floor, plain, plain);
   make->add_shape(sphere_at({-0.8, 0.5, 0.2}, 0.5),
-                  make.one_sided(RoughConductor{ggx(0.25), kGoldEta, kGoldK, gray(1.0)}));
+                  make.one_sided(Ward{Ward::Variant::Duer, 0.2, gray(0.2), gray(0.4)}));
   make->add_shape(round_mesh({0.5, 0.5, -0.3}, 0.5, 8),
-                  make.one_sided(Diffuse{gray(0.7)}, bumps(-0.08)));
+                  make.one_sided(Ward{Ward::Variant::Ward, 0.25, textured(8, 0.1, 0.5), gray(0.3)},
+                                 bumps(-0.08)));
   const Texture weight = textured(8, 0.1, 0.9);
   make->add_shape(
       sphere_at({-1.3, 0.35, 1.1}, 0.35),
-      make.one_sided(Blend{weight, boxed(Diffuse{textured(8, 0.3, 0.8)}),
-                           boxed(RoughConductor{ggx(0.15), kGoldEta, kGoldK, gray(1.0)})}));
+      make.one_sided(Blend{
+          weight, boxed(Ward{Ward::Variant::Balanced, 0.15, textured(8, 0.3, 0.6), gray(0.3)}),
+          boxed(RoughConductor{ggx(0.15), kGoldEta, kGoldK, gray(1.0)})}));
   make->add_shape(
       quad({0.9, 0.1, -1.2}, {0.9, 0, 0.4}, {0, 1.4, 0}, true, 0.1),
       make.two_sided(
@@ -379,7 +382,7 @@ Scene plan(bool with_caustics) {
   }
   const auto black = make.one_sided(Diffuse{gray(0.0)});
   make->add_shape(quad({-0.6, 2.9, -0.6}, {1.2, 0, 0}, {0, 0, 1.2}), black, Rgbd{4, 4, 4});
-  make->add_shape(round_mesh({-1.5, 1.6, -1.0}, 0.3, 4, false), black, Rgbd{3, 4, 5});
+  make->add_shape(round_mesh({-1.5, 1.6, -1.0}, 0.3, 4, false), black, textured(8, 2.0, 5.0));
   if (with_caustics) {
     make->add_emitter(SpotEmitter({0.3, 3.2, 2.0}, {-0.1, -3.0, -1.8}, {40, 35, 30}, 0.6, 0.2));
     make->add_emitter(DirectionalEmitter{Vec3d(0.5, -1.0, -0.8).normalized(), {0.4, 0.5, 0.6}});

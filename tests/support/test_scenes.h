@@ -18,7 +18,7 @@ struct TestScene {
 
 /// All of them, built on first use.
 ///   room       diffuse, two-sided and Phong walls with textures under planar, disk, spherical and
-///              non-planar area emitters; rough metals
+///              non-planar area emitters, the first three textured; rough metals
 ///   glass      smooth and rough interfaces, mirrors, a point emitter
 ///   sun        glossy things under an environment map with a small bright sun, behind a window
 ///   overcast   the same kinds under a constant environment, seen through a rough window
