@@ -39,6 +39,7 @@ bool is_delta(const Bsdf& bsdf) {
     return is_delta(blend->first->bsdf) && is_delta(blend->second->bsdf);
   if (const auto* mask = std::get_if<Mask>(&bsdf))
     return mask->nested == nullptr || is_delta(mask->nested->bsdf);
+  if (const auto* coating = std::get_if<Coating>(&bsdf)) return is_delta(coating->nested->bsdf);
   return std::holds_alternative<Conductor>(bsdf) || std::holds_alternative<Dielectric>(bsdf) ||
          std::holds_alternative<ThinDielectric>(bsdf);
 }
@@ -51,8 +52,9 @@ bool has_delta(const Bsdf& bsdf, Scattering scattering) {
   if (const auto* mask = std::get_if<Mask>(&bsdf))
     return scattering == Scattering::Transmission ||
            (mask->nested != nullptr && has_delta(mask->nested->bsdf, scattering));
-  const bool reflects =
-      std::holds_alternative<Conductor>(bsdf) || std::holds_alternative<Plastic>(bsdf);
+  const bool reflects = std::holds_alternative<Conductor>(bsdf) ||
+                        std::holds_alternative<Plastic>(bsdf) ||
+                        std::holds_alternative<Coating>(bsdf);
   return reflects && scattering == Scattering::Reflection;
 }
 
@@ -74,6 +76,7 @@ bool is_diffuse(const Bsdf& bsdf) {
   }
   if (const auto* mask = std::get_if<Mask>(&bsdf))
     return mask->nested != nullptr && is_diffuse(mask->nested->bsdf);
+  if (const auto* coating = std::get_if<Coating>(&bsdf)) return is_diffuse(coating->nested->bsdf);
   return std::holds_alternative<Diffuse>(bsdf) || std::holds_alternative<Plastic>(bsdf);
 }
 
@@ -82,6 +85,7 @@ int lobe_count(const Bsdf& bsdf) {
     return lobe_count(blend->first->bsdf) + lobe_count(blend->second->bsdf);
   if (const auto* mask = std::get_if<Mask>(&bsdf))
     return mask->nested == nullptr ? 0 : lobe_count(mask->nested->bsdf);
+  if (const auto* coating = std::get_if<Coating>(&bsdf)) return lobe_count(coating->nested->bsdf);
   if (is_delta(bsdf)) return 0;
   // Black, which fills up blends, has no share in anything.
   const auto* diffuse = std::get_if<Diffuse>(&bsdf);

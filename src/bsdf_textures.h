@@ -48,6 +48,10 @@ void for_each_texture(const Bsdf& bsdf, const Visit& visit) {
       visit(b.opacity);
       if (b.nested != nullptr) for_each_texture(b.nested->bsdf, visit);
     }
+    void operator()(const Coating& b) const {
+      visit(b.specular_reflectance);
+      for_each_texture(b.nested->bsdf, visit);
+    }
     void operator()(const Blend& b) const {
       visit(b.weight);
       for_each_texture(b.first->bsdf, visit);

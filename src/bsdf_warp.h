@@ -323,6 +323,39 @@ T pdf_bsdf(const Mask& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const Ve
   return nested_probability<T>(b, at.uv) * pdf_of<T>(b.nested->bsdf, at, wi, wo);
 }
 
+/// The layer reflects with probability F. What comes from below is refracted, or lost if the layer
+/// holds it back.
+template <Scalar T>
+Warped<T> warp_bsdf(const Coating& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                    const Vec3<T>& u) {
+  using std::sqrt;
+  const T cos_i = dot(at.n, wi);
+  if (value(cos_i) <= 0.0) return std::nullopt;
+  const double f = 1.0 - coat_transmittance(b, value(cos_i));
+  const double choice = value(u.z());
+  if (choice < f) return BsdfSampleOf<T>{reflect(wi, at.n), Scattering::Reflection, true};
+  const Vec3<T> rest(u.x(), u.y(), constant<T>((choice - f) / (1.0 - f)));
+  const auto below = warp<T>(b.nested->bsdf, at, b.inner(at.n, wi, cos_i), rest);
+  if (!below) return std::nullopt;
+  if (below->delta) return BsdfSampleOf<T>{reflect(wi, at.n), Scattering::Reflection, true};
+  const T inner = dot(at.n, below->wo);
+  const T cos2 = 1.0 - (1.0 - inner * inner) * (b.eta * b.eta);
+  if (value(cos2) <= 0.0) return std::nullopt;
+  const Vec3<T> wo =
+      scaled(below->wo, constant<T>(b.eta)) + scaled(at.n, T(sqrt(cos2) - inner * b.eta));
+  return reflected<T>(wo, wi, at.n);
+}
+
+/// d omega' / d omega = cos_o / (eta^2 cos_o')
+template <Scalar T>
+T pdf_bsdf(const Coating& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& wo) {
+  const T cos_i = dot(at.n, wi);
+  const T cos_o = dot(at.n, wo);
+  if (value(cos_i) <= 0.0 || value(cos_o) <= 0.0) return constant<T>(0.0);
+  const T below = pdf_of<T>(b.nested->bsdf, at, b.inner(at.n, wi, cos_i), b.inner(at.n, wo, cos_o));
+  return coat_transmittance(b, cos_i) * below * cos_o / (b.inner_cosine(cos_o) * (b.eta * b.eta));
+}
+
 /// The second with probability w.
 template <Scalar T>
 Warped<T> warp_bsdf(const Blend& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
@@ -373,6 +406,16 @@ T probability_of_delta(const Mask& b, const SurfacePoint<T>& at, const Vec3<T>& 
   const T through = scattering == Scattering::Transmission ? T(1.0 - p) : constant<T>(0.0);
   if (b.nested == nullptr) return through;
   return through + p * delta_probability_of<T>(b.nested->bsdf, at, wi, scattering);
+}
+template <Scalar T>
+T probability_of_delta(const Coating& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                       Scattering scattering) {
+  const T cos_i = dot(at.n, wi);
+  if (scattering == Scattering::Transmission || value(cos_i) <= 0.0) return constant<T>(0.0);
+  const T t = coat_transmittance(b, cos_i);
+  return 1.0 - t +
+         t * delta_probability_of<T>(b.nested->bsdf, at, b.inner(at.n, wi, cos_i),
+                                     Scattering::Reflection);
 }
 template <Scalar T>
 T probability_of_delta(const Blend& b, const SurfacePoint<T>& at, const Vec3<T>& wi,

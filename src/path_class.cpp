@@ -32,6 +32,7 @@ struct BsdfKind {
   std::string operator()(const Mask& b) const {
     return b.nested == nullptr ? "null" : "masked " + kind_of(b.nested->bsdf);
   }
+  std::string operator()(const Coating& b) const { return "coated " + kind_of(b.nested->bsdf); }
   std::string operator()(const Blend& b) const {
     return "blend of " + kind_of(b.first->bsdf) + " and " + kind_of(b.second->bsdf);
   }
@@ -43,27 +44,24 @@ std::string passage(const ScatterEvent<double>& e) {
   return (e.scattering == Scattering::Reflection ? " reflection " : " transmission ") + side;
 }
 
+/// Which of two lobes is the brighter one.
+template <class B>
+bool is_glossy(const B& b, const ScatterEvent<double>& e) {
+  const Vec3d& n = e.at.n_s;
+  const auto lobes = detail::lobes<double>(b, n.dot(e.wi), n.dot(e.wo), e.wi.dot(e.wo), e.at.uv);
+  return lobes.glossy > lobes.diffuse;
+}
+
 std::string lobe(const Phong& b, const ScatterEvent<double>& e) {
-  const double lobe = detail::phong_lobe(b, e.wo.dot(reflect(e.wi, e.at.n_s)));
-  const double specular = luminance(b.specular_reflectance.eval(e.at.uv)) * lobe;
-  const double diffuse = luminance(b.diffuse_reflectance.eval(e.at.uv)) * kInvPi;
-  return specular > diffuse ? " glossy lobe" : " diffuse lobe";
+  return is_glossy(b, e) ? " glossy lobe" : " diffuse lobe";
 }
 
 std::string lobe(const Ward& b, const ScatterEvent<double>& e) {
-  const Vec3d& n = e.at.n_s;
-  const double lobe = detail::ward_lobe(b, n.dot(e.wi), n.dot(e.wo), e.wi.dot(e.wo));
-  const double specular = luminance(b.specular_reflectance.eval(e.at.uv)) * lobe;
-  const double diffuse = luminance(b.diffuse_reflectance.eval(e.at.uv)) * kInvPi;
-  return specular > diffuse ? " glossy lobe" : " diffuse lobe";
+  return is_glossy(b, e) ? " glossy lobe" : " diffuse lobe";
 }
 
 std::string lobe(const RoughPlastic& b, const ScatterEvent<double>& e) {
-  const Vec3d& n = e.at.n_s;
-  const auto part = detail::rough_plastic_parts(b, n.dot(e.wi), n.dot(e.wo), e.wi.dot(e.wo));
-  const double specular = luminance(b.specular_reflectance.eval(e.at.uv)) * part.specular;
-  const double diffuse = luminance(b.base.albedo(e.at.uv)) * part.diffuse;
-  return specular > diffuse ? " coat" : " base";
+  return is_glossy(b, e) ? " coat" : " base";
 }
 
 std::string lobe(const Blend& b, const ScatterEvent<double>& e) {
@@ -76,7 +74,8 @@ std::string lobe(const ScatterEvent<double>& e, bool delta) {
   const std::string kind = kind_of(e.bsdf);
   if (std::holds_alternative<Mask>(e.bsdf) && delta && e.scattering == Scattering::Transmission)
     return kind + " passed";
-  if (std::holds_alternative<Plastic>(e.bsdf)) return kind + (delta ? " coat" : " base");
+  if (std::holds_alternative<Plastic>(e.bsdf) || std::holds_alternative<Coating>(e.bsdf))
+    return kind + (delta ? " coat" : " base");
   const auto* blend = std::get_if<Blend>(&e.bsdf);
   if (blend != nullptr && delta) return kind + ", smooth" + passage(e);
   if (is_transmissive(e.bsdf)) return kind + passage(e);

@@ -58,6 +58,9 @@ struct Brightness {
     const bool opaque = b.opacity.is_constant() && (b.opacity.color >= 1.0).all();
     return opaque ? nested : 1.0;
   }
+  double operator()(const Coating& b) const {
+    return std::max(b.specular_reflectance.maximum(), std::visit(*this, b.nested->bsdf));
+  }
   double operator()(const Blend& b) const {
     return std::max(std::visit(*this, b.first->bsdf), std::visit(*this, b.second->bsdf));
   }

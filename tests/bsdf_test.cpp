@@ -309,6 +309,50 @@ TEST(Bsdf, EvalOverPdfInClosedForm) {
   }
 }
 
+// Law: a layer of the index outside changes nothing; one over something white is reciprocal, its
+// samples bring what its integral is, and what they lose the layer holds back; and without
+// absorption nothing is gained.
+TEST(Bsdf, Coating) {
+  Rng rng(77, Stream::Test, 0);
+  const auto metal = boxed(RoughConductor{{Distribution::Ggx, 0.3}});
+  const Bsdf bare = metal->bsdf;
+  const Bsdf none = Coating{1.0, kWhite, Rgbd::Zero(), metal};
+  for (const auto& nested : {metal, boxed(Diffuse{kWhite})}) {
+    const Bsdf layer = Coating{1.5, kWhite, Rgbd{0.1, 0.1, 0.1}, nested};
+    const Bsdf clear = Coating{1.5, kWhite, Rgbd::Zero(), nested};
+    for (const Vec3d& wi : view_directions(false)) {
+      Moments integral;
+      Moments sampled;
+      Moments energy;
+      Moments density;
+      for (int i = 0; i < 40000; ++i) {
+        const Vec3d any =
+            to_world(square_to_cosine_hemisphere(rng.uniform(), rng.uniform()), kPoint.n);
+        const double uniform = kPi / kPoint.n.dot(any);
+        EXPECT_NEAR(eval_luminance(none, wi, any), eval_luminance(bare, wi, any),
+                    1e-9 * eval_luminance(bare, wi, any));
+        EXPECT_NEAR(eval_luminance(layer, wi, any) * kPoint.n.dot(wi),
+                    eval_luminance(layer, any, wi) * kPoint.n.dot(any),
+                    1e-9 * eval_luminance(layer, wi, any));
+        integral.add(uniform * eval_luminance(layer, wi, any));
+        density.add(uniform * pdf(layer, kPoint, wi, any));
+        const auto next = sample(layer, kPoint, wi, rng.uniform3());
+        const bool scattered = next && !next->delta;
+        const double f = scattered ? eval_luminance(layer, wi, next->wo) : 0.0;
+        sampled.add(scattered ? f / pdf(layer, kPoint, wi, next->wo) : 0.0);
+        energy.add(uniform * eval_luminance(clear, wi, any));
+      }
+      const double difference = integral.mean() - sampled.mean();
+      EXPECT_LT(std::abs(difference), 5.0 * std::hypot(integral.error(), sampled.error()));
+      const ScaledColor<double> mirror = eval_delta(clear, kPoint, wi, Scattering::Reflection);
+      const double direct = std::exp(mirror.log_scale) * luminance(mirror.color);
+      EXPECT_LT(energy.mean() + direct, 1.0 + 4.0 * energy.error() + 1e-6);
+      EXPECT_LT(density.mean() + delta_probability(layer, kPoint, wi, Scattering::Reflection),
+                1.0 + 4.0 * density.error() + 1e-6);
+    }
+  }
+}
+
 // Law: Phong's lobe at the mirror direction is rho_s (n + 2) / (2 pi), beside rho_d / pi.
 TEST(Bsdf, PhongPeak) {
   const Bsdf phong = Phong{Texture(Rgbd::Constant(0.3)), Texture(Rgbd::Constant(0.5)), 20};

@@ -183,6 +183,14 @@ std::vector<Fault> scatter_faults() {
                     [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
                       if (is<RoughPlastic>(b)) f.cos_o[0] *= 1.01;
                     }),
+      scatter_fault("coating: factor by wi.wo",
+                    [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
+                      if (is<Coating>(b)) f.io *= 1.01;
+                    }),
+      scatter_fault("coating: factor by cos_i",
+                    [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
+                      if (is<Coating>(b)) f.cos_i *= 1.01;
+                    }),
       scatter_fault("mask: slope of the opacity",
                     [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
                       if (is<Mask>(b)) f.v[2] *= 1.01;

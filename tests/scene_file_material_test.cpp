@@ -113,6 +113,18 @@ TEST(BsdfsXml, ReadsWard) {
   EXPECT_EQ(rough.alpha, 0.3);
 }
 
+TEST(BsdfsXml, ReadsCoatings) {
+  const auto coating = std::get<Coating>(load_bsdf(
+      R"(<bsdf type="coating"><float name="intIOR" value="1.6"/><float name="extIOR" value="1"/>
+         <float name="thickness" value="2"/><rgb name="sigmaA" value="0.1, 0.2, 0.3"/>
+         <bsdf type="roughconductor"/></bsdf>)"));
+  EXPECT_EQ(coating.eta, 1.6);
+  expect_near(coating.absorption, Rgbd(0.2, 0.4, 0.6));
+  EXPECT_TRUE(std::holds_alternative<RoughConductor>(coating.nested->bsdf));
+  EXPECT_THROW(load_bsdf(R"(<bsdf type="coating"><bsdf type="dielectric"/></bsdf>)"), SceneError);
+  EXPECT_THROW(load_bsdf(R"(<bsdf type="coating"/>)"), SceneError);
+}
+
 TEST(BsdfsXml, ReadsPhong) {
   const std::string colors = R"(<rgb name="diffuseReflectance" value="0.6, 0.1, 0"/>
                                 <rgb name="specularReflectance" value="0.6, 0.2, 0.3"/>)";

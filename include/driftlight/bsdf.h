@@ -144,6 +144,32 @@ struct Mask {
   std::shared_ptr<const BsdfBox> nested;
 };
 
+/// A smooth layer of index eta over another BSDF that reflects alone: a delta lobe of weight F, and
+/// what enters and leaves by refraction,
+///   f cos_o = T_i T_o A f'(wi', wo') cos_o' cos_o / (eta^2 cos_o'),   A = exp(-a (1/c_i' +
+///   1/c_o')),
+/// primes within the layer, a its absorption times its thickness. Within it light is reflected
+/// once.
+struct Coating {
+  double eta = 1.5046 / 1.000277;
+  Texture specular_reflectance{Rgbd{1, 1, 1}};
+  Rgbd absorption{0, 0, 0};
+  std::shared_ptr<const BsdfBox> nested;
+
+  /// The cosine within the layer of a direction outside.
+  template <Scalar T>
+  T inner_cosine(const T& cosine) const {
+    using std::sqrt;
+    return sqrt(1.0 - (1.0 - cosine * cosine) * (1.0 / (eta * eta)));
+  }
+  /// w / eta + (c' - c / eta) n: within the layer the direction w, on the same side of the surface.
+  template <Scalar T>
+  Vec3<T> inner(const Vec3<T>& n, const Vec3<T>& w, const T& cosine) const {
+    return scaled(w, constant<T>(1.0 / eta)) +
+           scaled(n, T(inner_cosine(cosine) - cosine * (1.0 / eta)));
+  }
+};
+
 /// (1 - w) f_1 + w f_2 of two other BSDFs, w the first channel of `weight`, within [0, 1]. Where
 /// both transmit by a delta lobe these must go into the same direction (equal delta_eta).
 struct Blend {
@@ -152,10 +178,10 @@ struct Blend {
 };
 
 /// A BSDF is a density (Diffuse, rough ones, Phong, Ward), one or two delta lobes (Conductor,
-/// Dielectric, ThinDielectric), or both (Plastic, Mask, Blend): then a path says at each vertex by
-/// which it goes on. There is at most one delta lobe of each kind of scattering.
+/// Dielectric, ThinDielectric), or both (Plastic, Mask, Coating, Blend): then a path says at each
+/// vertex by which it goes on. There is at most one delta lobe of each kind of scattering.
 using Bsdf = std::variant<Diffuse, Conductor, RoughConductor, Dielectric, RoughDielectric, Phong,
-                          Ward, Plastic, RoughPlastic, ThinDielectric, Mask, Blend>;
+                          Ward, Plastic, RoughPlastic, ThinDielectric, Mask, Coating, Blend>;
 
 struct BsdfBox {
   Bsdf bsdf;
@@ -320,20 +346,6 @@ T phong_lobe(const Phong& b, const T& cos_mirror) {
   return (b.exponent + 2.0) * (0.5 * kInvPi) * exp(b.exponent * log(cos_mirror));
 }
 
-template <Scalar T>
-ScaledColor<T> eval_bsdf(const Phong& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
-                         const Vec3<T>& wo) {
-  using std::log;
-  const T cos_o = dot(at.n, wo);
-  if (value(dot(at.n, wi)) <= 0.0 || value(cos_o) <= 0.0) return ScaledColor<T>::zero();
-  const T lobe = phong_lobe(b, dot(wo, reflect(wi, at.n)));
-  const Rgb<T> diffuse = b.diffuse_reflectance.eval(at.uv);
-  const Rgb<T> specular = b.specular_reflectance.eval(at.uv);
-  Rgb<T> color;
-  for (int c = 0; c < 3; ++c) color[c] = diffuse[c] * kInvPi + specular[c] * lobe;
-  return {log(cos_o), color};
-}
-
 /// E of Ward, by D = exp(-t) / (pi alpha^2 C^2), C = cos^2(h, n) = (cos_i + cos_o)^2 / h.h.
 template <Scalar T>
 T ward_lobe(const Ward& b, const T& cos_i, const T& cos_o, const T& io) {
@@ -347,19 +359,35 @@ T ward_lobe(const Ward& b, const T& cos_i, const T& cos_o, const T& io) {
   return 0.25 * d * sqr(cos_h2) / (b.variant == Ward::Variant::Ward ? T(sqrt(cosines)) : cosines);
 }
 
+/// Of two lobes that these reflectances are to be multiplied with, and cos_o.
+template <Scalar T>
+ScaledColor<T> eval_gloss(const Texture& specular, const T& lobe, const Texture& diffuse,
+                          const T& cos_o, const Vec2<T>& uv) {
+  using std::log;
+  const Rgb<T> rho_s = specular.eval(uv);
+  const Rgb<T> rho_d = diffuse.eval(uv);
+  Rgb<T> color;
+  for (int c = 0; c < 3; ++c) color[c] = rho_d[c] * kInvPi + rho_s[c] * lobe;
+  return {log(cos_o), color};
+}
+
+template <Scalar T>
+ScaledColor<T> eval_bsdf(const Phong& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                         const Vec3<T>& wo) {
+  const T cos_o = dot(at.n, wo);
+  if (value(dot(at.n, wi)) <= 0.0 || value(cos_o) <= 0.0) return ScaledColor<T>::zero();
+  const T lobe = phong_lobe(b, dot(wo, reflect(wi, at.n)));
+  return eval_gloss(b.specular_reflectance, lobe, b.diffuse_reflectance, cos_o, at.uv);
+}
+
 template <Scalar T>
 ScaledColor<T> eval_bsdf(const Ward& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
                          const Vec3<T>& wo) {
-  using std::log;
   const T cos_i = dot(at.n, wi);
   const T cos_o = dot(at.n, wo);
   if (value(cos_i) <= 0.0 || value(cos_o) <= 0.0) return ScaledColor<T>::zero();
   const T lobe = ward_lobe(b, cos_i, cos_o, T(dot(wi, wo)));
-  const Rgb<T> diffuse = b.diffuse_reflectance.eval(at.uv);
-  const Rgb<T> specular = b.specular_reflectance.eval(at.uv);
-  Rgb<T> color;
-  for (int c = 0; c < 3; ++c) color[c] = diffuse[c] * kInvPi + specular[c] * lobe;
-  return {log(cos_o), color};
+  return eval_gloss(b.specular_reflectance, lobe, b.diffuse_reflectance, cos_o, at.uv);
 }
 
 template <Scalar T>
@@ -415,12 +443,67 @@ ScaledColor<T> eval_bsdf(const RoughPlastic& b, const SurfacePoint<T>& at, const
   return {constant<T>(0.0), color};
 }
 
+/// Luminances of the two lobes of a BSDF, up to a common factor.
+template <Scalar T>
+struct Lobes {
+  T glossy, diffuse;
+
+  bool any() const { return value(glossy) + value(diffuse) > 0.0; }
+  T glossy_share() const { return glossy / (glossy + diffuse); }
+};
+template <Scalar T>
+Lobes<T> lobes(const Phong& b, const T& cos_i, const T& cos_o, const T& io, const Vec2<T>& uv) {
+  return {luminance(b.specular_reflectance.eval(uv)) * phong_lobe(b, T(2.0 * cos_i * cos_o - io)),
+          luminance(b.diffuse_reflectance.eval(uv)) * kInvPi};
+}
+template <Scalar T>
+Lobes<T> lobes(const Ward& b, const T& cos_i, const T& cos_o, const T& io, const Vec2<T>& uv) {
+  return {luminance(b.specular_reflectance.eval(uv)) * ward_lobe(b, cos_i, cos_o, io),
+          luminance(b.diffuse_reflectance.eval(uv)) * kInvPi};
+}
+template <Scalar T>
+Lobes<T> lobes(const RoughPlastic& b, const T& cos_i, const T& cos_o, const T& io,
+               const Vec2<T>& uv) {
+  const RoughPlasticParts<T> part = rough_plastic_parts(b, cos_i, cos_o, io);
+  return {luminance(b.specular_reflectance.eval(uv)) * part.specular,
+          luminance(b.base.albedo(uv)) * part.diffuse};
+}
+
 template <Scalar T>
 ScaledColor<T> eval_bsdf(const Mask& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
                          const Vec3<T>& wo) {
   if (b.nested == nullptr) return ScaledColor<T>::zero();
   const ScaledColor<T> f = eval(b.nested->bsdf, at, wi, wo);
   return {f.log_scale, b.opacity.eval(at.uv) * f.color};
+}
+
+/// T and A of a layer, from the cosines outside.
+template <Scalar T>
+T coat_transmittance(const Coating& b, const T& cosine) {
+  return 1.0 - fresnel_dielectric(cosine, b.eta);
+}
+template <Scalar T>
+Rgb<T> coat_attenuation(const Coating& b, const T& cos_i, const T& cos_o) {
+  using std::exp;
+  if ((b.absorption == 0.0).all()) return constant<T>(Rgbd{1, 1, 1});
+  const T path = 1.0 / b.inner_cosine(cos_i) + 1.0 / b.inner_cosine(cos_o);
+  Rgb<T> result;
+  for (int c = 0; c < 3; ++c) result[c] = exp(path * -b.absorption[c]);
+  return result;
+}
+
+template <Scalar T>
+ScaledColor<T> eval_bsdf(const Coating& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                         const Vec3<T>& wo) {
+  using std::log;
+  const T cos_i = dot(at.n, wi);
+  const T cos_o = dot(at.n, wo);
+  if (value(cos_i) <= 0.0 || value(cos_o) <= 0.0) return ScaledColor<T>::zero();
+  const ScaledColor<T> f =
+      eval(b.nested->bsdf, at, b.inner(at.n, wi, cos_i), b.inner(at.n, wo, cos_o));
+  const T through = coat_transmittance(b, cos_i) * coat_transmittance(b, cos_o) * cos_o /
+                    (b.inner_cosine(cos_o) * (b.eta * b.eta));
+  return {f.log_scale + log(through), f.color * coat_attenuation(b, cos_i, cos_o)};
 }
 
 /// (1 - w) f_1 + w f_2, in units of the larger one.
@@ -537,6 +620,27 @@ ScaledColor<T> eval_delta_lobe(const Mask& b, const SurfacePoint<T>& at, const V
   Rgb<T> color;
   const T scale = exp(f.log_scale);
   for (int c = 0; c < 3; ++c) color[c] = 1.0 - opacity[c] + opacity[c] * scale * f.color[c];
+  return {constant<T>(0.0), color};
+}
+
+/// The layer's own, and what a delta lobe under it reflects: both into the mirror direction.
+template <Scalar T>
+ScaledColor<T> eval_delta_lobe(const Coating& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+                               Scattering scattering) {
+  using std::exp;
+  const T cos_i = dot(at.n, wi);
+  if (scattering == Scattering::Transmission || value(cos_i) <= 0.0) return ScaledColor<T>::zero();
+  const T t = coat_transmittance(b, cos_i);
+  const Rgb<T> specular = b.specular_reflectance.eval(at.uv);
+  Rgb<T> color;
+  for (int c = 0; c < 3; ++c) color[c] = (1.0 - t) * specular[c];
+  const ScaledColor<T> under =
+      eval_delta(b.nested->bsdf, at, b.inner(at.n, wi, cos_i), Scattering::Reflection);
+  if (value(under.color).maxCoeff() > 0.0) {
+    const Rgb<T> attenuation = coat_attenuation(b, cos_i, cos_i);
+    const T through = t * t * exp(under.log_scale);
+    for (int c = 0; c < 3; ++c) color[c] += through * attenuation[c] * under.color[c];
+  }
   return {constant<T>(0.0), color};
 }
 

@@ -139,49 +139,48 @@ class ConstraintVisitor : public WalkVisitor<T> {
   void constrain(const Plastic&, const ScatterEvent<T>& e, const S& share) {
     add_diffuse(e, share);
   }
+  /// Two lobes, each weighted by its share of f at X; `add_glossy` takes its weight.
+  template <class B, class AddGlossy>
+  void add_lobes(const B& b, const ScatterEvent<T>& e, const S& share,
+                 const AddGlossy& add_glossy) {
+    const auto cosine = [](const Vec3<T>& x, const Vec3<T>& y) { return S(strip(dot(x, y))); };
+    const Vec3<T>& n = e.at.n_s;
+    const auto lobes =
+        detail::lobes<S>(b, cosine(n, e.wi), cosine(n, e.wo), cosine(e.wi, e.wo), uv_of(e));
+    if (!lobes.any()) return;
+    const S glossy = lobes.glossy_share();
+    if (value(glossy) > 0.0) add_glossy(S(share * glossy));
+    if (value(glossy) < 1.0) add_diffuse(e, S(share * (1.0 - glossy)));
+  }
+  /// The glossy lobe constrains wo to the mirror direction with sigma = 1 / sqrt(n).
+  void constrain(const Phong& b, const ScatterEvent<T>& e, const S& share) {
+    add_lobes(b, e, share, [&](const S& weight) {
+      add(e.wo - reflect(e.wi, e.at.n_s), S(weight * b.exponent));
+    });
+  }
+  void constrain(const Ward& b, const ScatterEvent<T>& e, const S& share) {
+    add_lobes(b, e, share,
+              [&](const S& weight) { add_slopes(b.microfacets(), slopes(e, 1.0), weight); });
+  }
   void constrain(const RoughPlastic& b, const ScatterEvent<T>& e, const S& share) {
-    const auto part = detail::rough_plastic_parts(
-        b, S(strip(dot(e.at.n_s, e.wi))), S(strip(dot(e.at.n_s, e.wo))), S(strip(dot(e.wi, e.wo))));
-    const S specular = luminance(b.specular_reflectance.eval(uv_of(e))) * part.specular;
-    const S diffuse = luminance(b.base.albedo(uv_of(e))) * part.diffuse;
-    if (!(value(specular) + value(diffuse) > 0.0)) return;
-    const S coat = specular / (specular + diffuse);
-    if (value(coat) > 0.0) add_slopes(b.microfacets, slopes(e, 1.0), S(share * coat));
-    if (value(coat) < 1.0) add_diffuse(e, S(share * (1.0 - coat)));
+    add_lobes(b, e, share,
+              [&](const S& weight) { add_slopes(b.microfacets, slopes(e, 1.0), weight); });
   }
   void constrain(const Mask& b, const ScatterEvent<T>& e, const S& share) {
     if (b.nested != nullptr) constrain(b.nested->bsdf, e, share);
+  }
+  /// As what is below is constrained, by directions within the layer.
+  void constrain(const Coating& b, const ScatterEvent<T>& e, const S& share) {
+    const Vec3<T>& n = e.at.n_s;
+    const Vec3<T> wi = b.inner(n, e.wi, T(dot(n, e.wi)));
+    const Vec3<T> wo = b.inner(n, e.wo, T(dot(n, e.wo)));
+    constrain(b.nested->bsdf, {b.nested->bsdf, e.shape, e.at, wi, wo, e.scattering}, share);
   }
   void constrain(const Blend& b, const ScatterEvent<T>& e, const S& share) {
     const auto of =
         detail::blend_shares<S>(b, {stripped(e.at.n_s), uv_of(e)}, stripped(e.wi), stripped(e.wo));
     if (value(of.first) > 0.0) constrain(b.first->bsdf, e, S(share * of.first));
     if (value(of.second) > 0.0) constrain(b.second->bsdf, e, S(share * of.second));
-  }
-
-  /// Two lobes, as Phong's.
-  void constrain(const Ward& b, const ScatterEvent<T>& e, const S& share) {
-    const S lobe = detail::ward_lobe(b, S(strip(dot(e.at.n_s, e.wi))),
-                                     S(strip(dot(e.at.n_s, e.wo))), S(strip(dot(e.wi, e.wo))));
-    const S specular = luminance(b.specular_reflectance.eval(uv_of(e))) * lobe;
-    const S diffuse = luminance(b.diffuse_reflectance.eval(uv_of(e))) * kInvPi;
-    if (!(value(specular) + value(diffuse) > 0.0)) return;
-    const S glossy = specular / (specular + diffuse);
-    if (value(glossy) > 0.0) add_slopes(b.microfacets(), slopes(e, 1.0), S(share * glossy));
-    if (value(glossy) < 1.0) add_diffuse(e, S(share * (1.0 - glossy)));
-  }
-
-  /// Two lobes, each weighted by its share of f at X. The glossy one constrains wo to the mirror
-  /// direction with sigma = 1 / sqrt(n).
-  void constrain(const Phong& b, const ScatterEvent<T>& e, const S& share) {
-    const Vec3<T> mirror = reflect(e.wi, e.at.n_s);
-    const S lobe = detail::phong_lobe(b, S(strip(dot(e.wo, mirror))));
-    const S specular = luminance(b.specular_reflectance.eval(uv_of(e))) * lobe;
-    const S diffuse = luminance(b.diffuse_reflectance.eval(uv_of(e))) * kInvPi;
-    if (!(value(specular) + value(diffuse) > 0.0)) return;
-    const S glossy = specular / (specular + diffuse);
-    if (value(glossy) > 0.0) add(e.wo - mirror, S(share * glossy * b.exponent));
-    if (value(glossy) < 1.0) add_diffuse(e, S(share * (1.0 - glossy)));
   }
 
   Sink& sink_;

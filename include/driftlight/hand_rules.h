@@ -32,6 +32,9 @@
 ///   rough plastic    log(rho_s E + a B), E = F D G / (4 c_i) as rough metal, B = c_o T(c_i)
 ///   T(c_o):
 ///                    the partials of log E and log B by their shares                      (H30)
+///   coating          log T(c_i) T(c_o) c_o / c_o' - a (1/c_i' + 1/c_o') + log f'(c_i', c_o', m'),
+///     c' = sqrt(1 - (1 - c^2) / eta^2),  dc' = c / (eta^2 c') dc,
+///     m' = (m - c_i c_o) / eta^2 + c_i' c_o'                                            (H39)
 /// Delta lobes:
 ///   thin pane        log 2 R / (1 + R):  dR / (R (1 + R));
 ///                    log (1 - R) / (1 + R):  -2 dR / (1 - R^2)                           (H31)
@@ -41,6 +44,8 @@
 ///   mirror           dv = 2 c dn + 2 n (wi.dn + n.dwi) - dwi                             (H12)
 ///   refraction       v = k n - wi / eta, k = c / eta - s r, r = sqrt(1 - (1 - c^2) / eta^2):
 ///                    dv = k dn + n k' dc - dwi / eta,  k' = 1 / eta - s c / (eta^2 r)    (H13)
+///   coating          F rho_s + U, U = T^2 exp(-2 a / c') R'(c'):
+///                    rho_s F' + U (-2 F' / T + (2 a / c'^2 + dlog R'/dc') dc'/dc)        (H41)
 /// Geometry, for a ray (x, v) of length t that meets a surface with normal n:
 ///   dx' = (I - v n^T / n.v) (dx + t dv)                                                  (H14)
 ///   interpolated n = N / |N|, N = n_0 + b_1 e_1 + b_2 e_2:  dn = (I - n n^T) dN / |N|    (H15)
@@ -102,8 +107,8 @@ struct SurfaceDifferential {
   }
 };
 
-/// The rules (H2) to (H18), (H23) to (H34), (H37), (H38). A class, so that a test can replace
-/// single ones by wrong ones.
+/// The rules (H2) to (H18), (H23) to (H34), (H37) to (H39), (H41). A class, so that a test can
+/// replace single ones by wrong ones.
 struct HandRules {
   // ---- Microfacets ----
 
@@ -399,6 +404,30 @@ struct HandRules {
     return f;
   }
 
+  /// (H39)
+  static FactorPartials scatter(const Coating& b, double cos_i, double cos_o, double io,
+                                const Vec2d& uv, Scattering scattering) {
+    const double inverse_eta2 = 1.0 / (b.eta * b.eta);
+    const double in = b.inner_cosine(cos_i);
+    const double out = b.inner_cosine(cos_o);
+    const double d_in = cos_i * inverse_eta2 / in;
+    const double d_out = cos_o * inverse_eta2 / out;
+    const FactorPartials below = scatter(
+        b.nested->bsdf, in, out, (io - cos_i * cos_o) * inverse_eta2 + in * out, uv, scattering);
+    FactorPartials f = below;
+    f.color *= detail::coat_attenuation(b, cos_i, cos_o);
+    f.cos_i = below.cos_i * d_in + below.io * (out * d_in - cos_o * inverse_eta2);
+    f.cos_o = below.cos_o * d_out + below.io * (in * d_out - cos_i * inverse_eta2);
+    f.io = below.io * inverse_eta2;
+    const Fresnel enter = fresnel(cos_i, b.eta);
+    const Fresnel leave = fresnel(cos_o, b.eta);
+    f.cos_i[3] -= enter.slope / (1.0 - enter.value);
+    f.cos_o[3] += 1.0 / cos_o - d_out / out - leave.slope / (1.0 - leave.value);
+    f.cos_i.head<3>() += b.absorption * (d_in / (in * in));
+    f.cos_o.head<3>() += b.absorption * (d_out / (out * out));
+    return f;
+  }
+
   /// (H34) from the values and the partials of both.
   static FactorPartials blend(const Blend& b, const Vec2d& uv, const ScaledColor<double>& f1,
                               const FactorPartials& partials1, const ScaledColor<double>& f2,
@@ -522,6 +551,38 @@ struct HandRules {
     f.cos_i << log_slope(d_cosine, f.color), 0.0;
     const Rgbd d_u = (weight - 1.0) * slopes.u + opacity * weight * f.u.head<3>();
     const Rgbd d_v = (weight - 1.0) * slopes.v + opacity * weight * f.v.head<3>();
+    f.u.head<3>() = log_slope(d_u, f.color);
+    f.v.head<3>() = log_slope(d_v, f.color);
+    return f;
+  }
+  /// (H41)
+  static FactorPartials delta_lobe(const Coating& b, double cos_i, const Vec2d& uv,
+                                   Scattering scattering) {
+    FactorPartials f;
+    const Fresnel coat = fresnel(cos_i, b.eta);
+    const Rgbd rho = b.specular_reflectance.eval(uv);
+    const Texture::Slopes slopes = b.specular_reflectance.slopes(uv);
+    f.color = coat.value * rho;
+    Rgbd d_cos = coat.slope * rho;
+    Rgbd d_u = coat.value * slopes.u;
+    Rgbd d_v = coat.value * slopes.v;
+    if (has_delta(b.nested->bsdf, scattering)) {
+      const double in = b.inner_cosine(cos_i);
+      const double d_in = cos_i / (b.eta * b.eta * in);
+      const FactorPartials below = delta(b.nested->bsdf, in, uv, scattering);
+      const Vec3d wi(std::sqrt(std::max(0.0, 1.0 - in * in)), 0.0, in);
+      const ScaledColor<double> r =
+          eval_delta(b.nested->bsdf, SurfacePoint<double>{Vec3d::UnitZ(), uv}, wi, scattering);
+      const double t = 1.0 - coat.value;
+      const Rgbd under =
+          t * t * std::exp(r.log_scale) * r.color * detail::coat_attenuation(b, cos_i, cos_i);
+      f.color += under;
+      d_cos += under * (2.0 * b.absorption * (d_in / (in * in)) - 2.0 * coat.slope / t +
+                        (below.cos_i.head<3>() + below.cos_i[3]) * d_in);
+      d_u += under * below.u.head<3>();
+      d_v += under * below.v.head<3>();
+    }
+    f.cos_i.head<3>() = log_slope(d_cos, f.color);
     f.u.head<3>() = log_slope(d_u, f.color);
     f.v.head<3>() = log_slope(d_v, f.color);
     return f;

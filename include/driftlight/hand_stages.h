@@ -9,6 +9,8 @@
 ///   film    x = (right.v) / (2 a f), f = forward.v:
 ///           dx = (right - (right.v) forward / f) / (2 a f) . dv                           (H22)
 ///   spot    r = w_o: with its share of (H18)
+///   coating r of what is below, by w' = w / eta + (c' - c / eta) n with c' of (H39):
+///           dw' = dw / eta + n (c / (eta^2 c') - 1 / eta) dc + (c' - c / eta) dn         (H40)
 ///   emission, of an area r = v - c n, c = n.v: (H20);  of a spot r = v;  the point by its own
 ///   residuals, on the disk across parallel light r = y / R                                (H26)
 ///   blurred lamp, y = u + t v at the ray's nearest point, widths fixed:
@@ -367,32 +369,35 @@ class StageSweep : RecordedPath<Rules> {
     slopes(b.microfacets, x.scattering == Scattering::Reflection ? 1.0 : eta, x, dwi, dwo, dn,
            share);
   }
+  /// Two lobes; `add_glossy` takes the share of its one.
+  template <class B, class AddGlossy>
+  void add_lobes(const B& b, const Vertex& x, const Columns& dwo, const Columns& dn, double share,
+                 const AddGlossy& add_glossy) {
+    const auto lobes = detail::lobes<double>(b, x.cos_i, x.cos_o, x.io, x.uv);
+    if (!lobes.any()) return;
+    const double glossy = lobes.glossy_share();
+    if (glossy > 0.0) add_glossy(share * glossy);
+    if (glossy < 1.0) diffuse(x, dwo, dn, share * (1.0 - glossy));
+  }
   /// (H21)
   void constrain(const Phong& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
                  const Columns& dn, double share) {
-    const double lobe = detail::phong_lobe(b, 2.0 * x.cos_i * x.cos_o - x.io);
-    const double glossy = luminance(b.specular_reflectance.eval(x.uv)) * lobe;
-    const double matt = luminance(b.diffuse_reflectance.eval(x.uv)) * kInvPi;
-    if (!(glossy + matt > 0.0)) return;
-    const double part = glossy / (glossy + matt);
-    if (part > 0.0) {
+    add_lobes(b, x, dwo, dn, share, [&](double part) {
       const LocalRow d_cos = dot(x.wi, dn) + dot(x.n_s, dwi);
       const Columns mirror = 2.0 * x.cos_i * dn + outer(x.n_s, 2.0 * d_cos) - dwi;
-      add(std::sqrt(share * part * b.exponent) / 3.0, dwo - mirror);
-    }
-    if (part < 1.0) diffuse(x, dwo, dn, share * (1.0 - part));
+      add(std::sqrt(part * b.exponent) / 3.0, dwo - mirror);
+    });
   }
-
-  /// (H21) with (H19) in the place of the mirror direction
+  /// (H19)
   void constrain(const Ward& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
                  const Columns& dn, double share) {
-    const double lobe = detail::ward_lobe(b, x.cos_i, x.cos_o, x.io);
-    const double glossy = luminance(b.specular_reflectance.eval(x.uv)) * lobe;
-    const double matt = luminance(b.diffuse_reflectance.eval(x.uv)) * kInvPi;
-    if (!(glossy + matt > 0.0)) return;
-    const double part = glossy / (glossy + matt);
-    if (part > 0.0) slopes(b.microfacets(), 1.0, x, dwi, dwo, dn, share * part);
-    if (part < 1.0) diffuse(x, dwo, dn, share * (1.0 - part));
+    add_lobes(b, x, dwo, dn, share,
+              [&](double part) { slopes(b.microfacets(), 1.0, x, dwi, dwo, dn, part); });
+  }
+  void constrain(const RoughPlastic& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
+                 const Columns& dn, double share) {
+    add_lobes(b, x, dwo, dn, share,
+              [&](double part) { slopes(b.microfacets, 1.0, x, dwi, dwo, dn, part); });
   }
 
   void constrain(const ThinDielectric&, const Vertex&, const Columns&, const Columns&,
@@ -401,20 +406,28 @@ class StageSweep : RecordedPath<Rules> {
                  const Columns& dn, double share) {
     diffuse(x, dwo, dn, share);
   }
-  /// (H21) with (H19) in the place of the mirror direction
-  void constrain(const RoughPlastic& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
-                 const Columns& dn, double share) {
-    const auto parts = detail::rough_plastic_parts(b, x.cos_i, x.cos_o, x.io);
-    const double glossy = luminance(b.specular_reflectance.eval(x.uv)) * parts.specular;
-    const double matt = luminance(b.base.albedo(x.uv)) * parts.diffuse;
-    if (!(glossy + matt > 0.0)) return;
-    const double coat = glossy / (glossy + matt);
-    if (coat > 0.0) slopes(b.microfacets, 1.0, x, dwi, dwo, dn, share * coat);
-    if (coat < 1.0) diffuse(x, dwo, dn, share * (1.0 - coat));
-  }
   void constrain(const Mask& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
                  const Columns& dn, double share) {
     if (b.nested != nullptr) constrain(b.nested->bsdf, x, dwi, dwo, dn, share);
+  }
+  /// (H40)
+  static Columns inner(const Coating& b, const Vec3d& n, const Vec3d& w, double cosine,
+                       const Columns& dw, const Columns& dn) {
+    const double within = b.inner_cosine(cosine);
+    const LocalRow d_cos = dot(w, dn) + dot(n, dw);
+    const double slope = cosine / (b.eta * b.eta * within) - 1.0 / b.eta;
+    return (1.0 / b.eta) * dw + outer(n, slope * d_cos) + (within - cosine / b.eta) * dn;
+  }
+  void constrain(const Coating& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
+                 const Columns& dn, double share) {
+    Vertex below = x;
+    below.wi = b.inner(x.n_s, x.wi, x.cos_i);
+    below.wo = b.inner(x.n_s, x.wo, x.cos_o);
+    below.cos_i = b.inner_cosine(x.cos_i);
+    below.cos_o = b.inner_cosine(x.cos_o);
+    below.io = below.wi.dot(below.wo);
+    constrain(b.nested->bsdf, below, inner(b, x.n_s, x.wi, x.cos_i, dwi, dn),
+              inner(b, x.n_s, x.wo, x.cos_o, dwo, dn), dn, share);
   }
   void constrain(const Blend& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
                  const Columns& dn, double share) {

@@ -159,7 +159,7 @@ LangevinResult render_pssmlt(const Scene& scene, const PssmltOptions& options,
                              const RenderOptions& render, double mutations_per_pixel);
 
 /// Renders with multiplexed Metropolis light transport (Hachisuka, Kaplanyan and Dachsbacher 2014):
-/// chains of the random numbers of one strategy, which is a number too, at paths of one length.
+/// chains of the random numbers of one strategy. MmltOptions::large_steps says how it changes.
 /// Statistics as of Mode::Chain. Throws as render_langevin.
 LangevinResult render_mmlt(const Scene& scene, const MmltOptions& options,
                            const RenderOptions& render, double mutations_per_pixel);

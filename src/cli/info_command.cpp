@@ -127,10 +127,9 @@ std::string describe_integrator(std::string_view name, std::string_view method) 
 void run(const InfoCommand& command) {
   const LoadedScene loaded = load_scene(command.scene.file, {.defines = command.scene.defines});
   const Scene& scene = loaded.scene;
-  constexpr std::array<std::string_view, 12> kBsdfs{
-      "diffuse",         "conductor",      "roughconductor", "dielectric",
-      "roughdielectric", "phong",          "ward",           "plastic",
-      "roughplastic",    "thindielectric", "mask",           "blend"};
+  constexpr std::array<std::string_view, 13> kBsdfs{
+      "diffuse", "conductor",    "roughconductor", "dielectric", "roughdielectric", "phong", "ward",
+      "plastic", "roughplastic", "thindielectric", "mask",       "coating",         "blend"};
   constexpr std::array<std::string_view, 7> kEmitters{
       "area", "point", "constant", "envmap", "spot", "directional", "blurred area"};
   std::string text = row("scene", command.scene.file.string());

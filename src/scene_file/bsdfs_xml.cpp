@@ -318,6 +318,26 @@ Surface read_mixture(Properties& properties, LoadContext& context) {
   return sum < 1.0 - 1e-9 ? mix(result, black, 1.0 - sum) : result;
 }
 
+Surface read_coating(Properties& properties, LoadContext& context) {
+  Coating coating;
+  coating.eta = read_index(properties, "intIOR", "bk7") / read_index(properties, "extIOR", "air");
+  if (!(coating.eta > 1.0)) properties.element().fail("'intIOR' of a coating must exceed 'extIOR'");
+  coating.specular_reflectance =
+      read_scattering(properties, context, "specularReflectance", kWhite);
+  coating.absorption =
+      properties.non_negative("thickness", 1.0) * properties.color("sigmaA", Rgbd::Zero());
+  const std::vector<Element> nested = properties.nested({"bsdf", "ref"});
+  if (nested.size() != 1) properties.element().fail("a coating needs one nested bsdf");
+  const std::shared_ptr<Surface> surface = read_surface(nested.front(), context);
+  const bool transmits = has_delta(surface->front, Scattering::Transmission);
+  if (surface->back || transmits || is_transmissive(surface->front))
+    nested.front().fail("only a one-sided bsdf without transmission can be nested in a coating");
+  if (surface->relief != nullptr)
+    nested.front().fail("bump and normal maps cannot be nested in a coating; it can be in one");
+  coating.nested = boxed(surface->front);
+  return {coating, std::nullopt, std::nullopt};
+}
+
 Surface read_two_sided(Properties& properties, LoadContext& context) {
   const std::vector<Element> nested = properties.nested({"bsdf", "ref"});
   if (nested.empty() || nested.size() > 2)
@@ -344,7 +364,7 @@ Surface one_sided(Properties& properties, LoadContext& context) {
 }
 
 using BsdfReader = Surface (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, BsdfReader>, 17> kBsdfs{{
+constexpr std::array<std::pair<std::string_view, BsdfReader>, 18> kBsdfs{{
     {"diffuse", &one_sided<read_diffuse>},
     {"conductor", &one_sided<read_conductor>},
     {"roughconductor", &one_sided<read_rough_conductor>},
@@ -357,6 +377,7 @@ constexpr std::array<std::pair<std::string_view, BsdfReader>, 17> kBsdfs{{
     {"thindielectric", &one_sided<read_thin_dielectric>},
     {"null", &one_sided<read_null>},
     {"mask", &read_mask},
+    {"coating", &read_coating},
     {"blendbsdf", &read_blend},
     {"mixturebsdf", &read_mixture},
     {"twosided", &read_two_sided},

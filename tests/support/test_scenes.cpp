@@ -332,6 +332,18 @@ Scene coated(bool with_point) {
                   make.two_sided(Mask{gray(0.6), boxed(Plastic(kGlass, gray(0.6), tint, false))},
                                  Mask{gray(0.6), nullptr}));
   make->add_shape(sphere_at({-0.3, 1.5, -0.8}, 0.4), make.one_sided(Mask{gray(0.0), nullptr}));
+  const auto gold = [](double alpha) {
+    return RoughConductor{beckmann(alpha), kGoldEta, kGoldK, gray(1.0)};
+  };
+  make->add_shape(sphere_at({0.9, 0.25, 1.6}, 0.25),
+                  make.one_sided(Coating{kGlass, tint, {0.1, 0.2, 0.3}, boxed(gold(0.2))}));
+  make->add_shape(
+      sphere_at({1.4, 0.3, 1.3}, 0.3),
+      make.one_sided(Coating{1.3, gray(1.0), {0, 0, 0}, boxed(Diffuse{textured(8, 0.3, 0.8)})}));
+  make->add_shape(
+      sphere_at({-0.75, 0.28, 1.6}, 0.28),
+      make.one_sided(Coating{
+          kGlass, gray(1.0), {0.2, 0.1, 0.1}, boxed(Conductor{kGoldEta, kGoldK, gray(1.0)})}));
   const auto black = make.one_sided(Diffuse{gray(0.0)});
   make->add_shape(quad({-0.9, 2.8, -0.6}, {1.8, 0, 0}, {0, 0, 1.4}), black, Rgbd{4, 4, 4});
   make->add_shape(round_mesh({-1.4, 1.9, -0.5}, 0.35, 4, false), black, Rgbd{6, 7, 8});

@@ -23,7 +23,7 @@ struct TestScene {
 ///   sun        glossy things under an environment map with a small bright sun, behind a window
 ///   overcast   the same kinds under a constant environment, seen through a rough window
 ///   stage      diffuse and glossy things under a spot and parallel light, behind smooth glass
-///   coated     smooth and rough plastic, panes, masks and what only lets pass
+///   coated     smooth and rough plastic, layers, panes, masks and what only lets pass
 ///   plan       diffuse, glossy and smooth things and blends of them under area emitters, a spot
 ///              and parallel light, as an orthographic camera sees them; bump and normal maps
 const std::vector<TestScene>& test_scenes();
