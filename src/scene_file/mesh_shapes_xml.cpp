@@ -58,14 +58,15 @@ MaterialLibrary read_materials(const std::filesystem::path& obj, const ObjFile& 
       context.notice(element, "the materials '" + file.library + "' of '" + obj.string() +
                                   "' cannot be found; what has no bsdf is grey, as in Mitsuba");
   }
-  for (const auto& [name, surface] : attachments.by_material) {
+  for (const auto& entry : attachments.by_material) {
+    const std::string& name = entry.first;
     const bool occurs =
         std::any_of(file.parts.begin(), file.parts.end(),
                     [&](const ObjFile::Part& part) { return part.material == name; });
     if (!occurs)
       context.notice(element,
                      "no face of '" + obj.string() + "' is of the material '" + name + "'");
-    result[name] = surface;
+    result[name] = entry.second;
   }
   return result;
 }
