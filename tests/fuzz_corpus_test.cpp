@@ -12,6 +12,7 @@
 #include "scene_file/mesh_ply.h"
 #include "scene_file/mesh_serialized.h"
 #include "support/places.h"
+#include "support/scene_directory.h"
 
 namespace driftlight {
 namespace {
@@ -38,6 +39,21 @@ TEST(FuzzCorpus, OfScenes) {
 
 TEST(FuzzCorpus, OfObjFiles) {
   EXPECT_GE(read_corpus("obj", [](const auto& file) { read_obj(file, {.one_mesh = false}); }), 1);
+}
+
+TEST(FuzzCorpus, OfMaterials) {
+  const test::SceneDirectory directory;
+  directory.write("mesh.obj",
+                  "mtllib materials.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+                  "usemtl first\nf 1/1 2/2 3/3\nusemtl third\nf 1/1 3/3 2/2\n");
+  const std::string scene =
+      test::lit(R"(<shape type="obj"><string name="filename" value="mesh.obj"/></shape>)");
+  const auto read = [&](const std::filesystem::path& file) {
+    std::filesystem::copy_file(file, directory.path() / "materials.mtl",
+                               std::filesystem::copy_options::overwrite_existing);
+    directory.load(scene);
+  };
+  EXPECT_GE(read_corpus("mtl", read), 1);
 }
 
 TEST(FuzzCorpus, OfPlyFiles) {
