@@ -46,9 +46,10 @@ void measure_jumps(const Scene& scene, const PathSampler& sampler, const Bootstr
           after.topology.block_count - (after.topology.end == PathEnd::AreaConnection ? 1 : 0);
       for (int k = 0; k < directions; ++k)
         row.directions += (after.coordinates(k) - before(k)).squaredNorm();
-      row.film += (scene.camera().film_position(after.coordinates(0)) -
-                   scene.camera().film_position(before(0)))
-                      .squaredNorm();
+      const auto film = [&](const Vec3d& v) {
+        return scene.camera().film_position(v, scene.camera().origin);
+      };
+      row.film += (film(after.coordinates(0)) - film(before(0))).squaredNorm();
     }
     statistics += chain.statistics();
   }

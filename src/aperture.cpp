@@ -293,10 +293,11 @@ class ApertureRows {
     const bool connects = topology_.ends_in_connection() && k == topology_.scatter_count;
     for (const Vec3d& w : aperture.rows) {
       if (w.isZero(0.0)) continue;
+      const int stage = k + topology_.lens_block_count();
       if (connects)
-        insert(path_, k, connection_row(aperture, w / 3.0));
+        insert(path_, stage, connection_row(aperture, w / 3.0));
       else
-        insert(path_, k + 1, state_row(k, aperture.kappa * w / 3.0, w / 3.0));
+        insert(path_, stage + 1, state_row(k, aperture.kappa * w / 3.0, w / 3.0));
     }
   }
 
@@ -349,7 +350,7 @@ class ApertureRows {
   }
 
   int block_of(int segment) const {
-    int block = 0;
+    int block = topology_.lens_block_count();
     for (int k = 0; k < segment; ++k)
       if (!segments_[k].determined) ++block;
     return block;

@@ -16,16 +16,23 @@ class TwoSidedTracer {
  public:
   TwoSidedTracer(const Scene& scene, const PathTopology& pattern,
                  const PathCoordinates& coordinates, PathTopology& result)
-      : scene_(scene), pattern_(pattern), coordinates_(coordinates), result_(result) {
+      : scene_(scene),
+        pattern_(pattern),
+        coordinates_(coordinates),
+        result_(result),
+        lens_(lens_point(scene, pattern, coordinates)),
+        next_block_(pattern.lens_block_count()) {
     result_.scatter_count = pattern.scatter_count;
     result_.light_count = pattern.light_count;
     result_.block_count = pattern.block_count;
+    result_.has_lens = pattern.has_lens;
     result_.phase_space = pattern.phase_space;
     result_.end = pattern.end;
     result_.emitter = pattern.emitter;
   }
 
   TraceStatus run() {
+    if (pattern_.has_lens && !scene_.camera().is_on_lens(lens_)) return TraceStatus::Missed;
     TraceStatus status = camera_side();
     if (status == TraceStatus::Ok) status = light_side();
     if (status == TraceStatus::Ok) status = join();
@@ -43,8 +50,8 @@ class TwoSidedTracer {
   TraceStatus camera_side() {
     if (pattern_.camera_count() == 0) return TraceStatus::Ok;
     const Vec3d& v = coordinates_(next_block_++);
-    if (!scene_.camera().sees(v)) return TraceStatus::Missed;
-    RayFollower follower(scene_, v);
+    if (!scene_.camera().sees(v, lens_)) return TraceStatus::Missed;
+    RayFollower follower(scene_, v, lens_);
     for (int k = 0; k < pattern_.camera_count(); ++k) {
       const TraceStatus status = arrive(k, follower, camera_end_);
       if (status != TraceStatus::Ok) return status;
@@ -137,8 +144,8 @@ class TwoSidedTracer {
   TraceStatus join() const {
     const Vec3d& p = light_end_->at.p;
     const Camera& camera = scene_.camera();
-    const Vec3d edge =
-        camera_end_ ? Vec3d(p - camera_end_->at.p) : camera.ray(camera.coordinate(p)).direction;
+    const Vec3d edge = camera_end_ ? Vec3d(p - camera_end_->at.p)
+                                   : camera.ray(camera.coordinate(p, lens_), lens_).direction;
     const TraceStatus at_light = scatters(pattern_.camera_count(), *light_end_, -edge);
     if (at_light != TraceStatus::Ok) return at_light;
     const Vec3d to = scene_.leave(p, light_end_->at.n_g, -edge);
@@ -152,19 +159,20 @@ class TwoSidedTracer {
   /// What lies before the near plane hides nothing.
   TraceStatus join_sensor(const Vec3d& to) const {
     const Camera& camera = scene_.camera();
-    const Vec3d v = camera.coordinate(light_end_->at.p);
-    if (!camera.sees(v)) return TraceStatus::Missed;
+    const Vec3d v = camera.coordinate(light_end_->at.p, lens_);
+    if (!camera.sees(v, lens_)) return TraceStatus::Missed;
     const double depth = camera.depth(light_end_->at.p);
     if (!(depth > camera.near_clip && depth < camera.far_clip)) return TraceStatus::Missed;
-    return scene_.occluded(to, camera.at_near_plane(camera.ray(v))) ? TraceStatus::Occluded
-                                                                    : TraceStatus::Ok;
+    return scene_.occluded(to, camera.at_near_plane(camera.ray(v, lens_))) ? TraceStatus::Occluded
+                                                                           : TraceStatus::Ok;
   }
 
   const Scene& scene_;
   const PathTopology& pattern_;
   const PathCoordinates& coordinates_;
   PathTopology& result_;
-  int next_block_ = 0;
+  const Vec3d& lens_;
+  int next_block_;
   std::array<Lobe, kMaxPathLength> lobes_;
   EmitterPoint emitter_point_;
   std::optional<SurfaceHit> camera_end_;  ///< none: the sensor

@@ -16,6 +16,7 @@ namespace driftlight {
 struct FoundPath {
   int s;
   int t;
+  const Vec3d& lens;           ///< the point on it that the path begins at (sensor.h)
   const Vec3d& v;              ///< v_0 of the subpath from the sensor
   const Subpath& from_sensor;  ///< x_1 .. x_(t-1) and more
   const Subpath& from_light;   ///< x_(n-1) .. x_t and more, for s > 1
@@ -24,8 +25,8 @@ struct FoundPath {
   double roulette;
 };
 
-/// Where a sample's random numbers come from: for its subpath from the sensor, that from the light,
-/// and the points on emitters that the former connects to.
+/// Where a sample's random numbers come from: for its subpath from the sensor, with the point on
+/// the lens first, that from the light, and the points on emitters that the former connects to.
 struct SampleNumbers {
   Rng& sensor;
   Rng& light;
@@ -56,6 +57,7 @@ class BidirectionalTracer {
   }
   template <class Sink>
   void sample(const Vec2d& film, const SampleNumbers& numbers, Sink& sink) {
+    draw_lens(numbers.sensor);
     const auto escape = trace_from_sensor(film, max_depth_, numbers.sensor);
     if (scene_.samples_emitters()) trace_from_light(max_depth_ - 1, numbers.light);
     for (int t = 2; t < from_sensor_.size() + 2; ++t) {
@@ -80,6 +82,7 @@ class BidirectionalTracer {
   void sample_strategy(int s, int t, const Vec2d& film, const SampleNumbers& numbers, Sink& sink) {
     if (s < 2 && t < 2) return;
     from_sensor_.clear();
+    draw_lens(numbers.sensor);
     const auto escape = t > 1 ? trace_from_sensor(film, t - 1, numbers.sensor) : std::nullopt;
     if (s > 1) {
       if (!scene_.samples_emitters()) return;
@@ -100,10 +103,11 @@ class BidirectionalTracer {
   const Emission& emission() const { return emission_; }
 
  private:
+  void draw_lens(Rng& rng) { lens_ = sample_lens(scene_.camera(), rng); }
   std::optional<Departure> trace_from_sensor(const Vec2d& film, int max_size, Rng& rng) {
-    v_ = scene_.camera().direction(film);
-    return tracer_.trace(Walk::FromSensor, tracer_.leave_sensor(v_), RayFollower(scene_, v_),
-                         max_size, rng, from_sensor_);
+    v_ = scene_.camera().direction(film, lens_);
+    return tracer_.trace(Walk::FromSensor, tracer_.leave_sensor(v_, lens_),
+                         RayFollower(scene_, v_, lens_), max_size, rng, from_sensor_);
   }
   void trace_from_light(int max_size, Rng& rng) {
     emission_ = guide_.sample(rng);
@@ -198,14 +202,14 @@ class BidirectionalTracer {
   /// t = 1
   template <class Sink>
   void connect_to_sensor(const SubpathVertex& y, int s, Sink& sink) const {
-    const auto seen = driftlight::connect_to_sensor(scene_, y);
+    const auto seen = driftlight::connect_to_sensor(scene_, y, lens_);
     if (seen)
       sink.splat(seen->film, weights_.sensor(y, *seen) * seen->value,
                  path(s, 1, emission_.end, y.roulette));
   }
 
   FoundPath path(int s, int t, const LightEnd& end, double roulette) const {
-    return {s, t, v_, from_sensor_, from_light_, end, roulette};
+    return {s, t, lens_, v_, from_sensor_, from_light_, end, roulette};
   }
 
   const Scene& scene_;
@@ -215,6 +219,7 @@ class BidirectionalTracer {
   int max_depth_;
   std::vector<std::uint32_t> blurred_;  ///< emitters
   // Of the sample in hand.
+  Vec3d lens_{0, 0, 0};
   Vec3d v_{0, 0, 0};
   Emission emission_;  ///< that `from_light_` starts with
   Subpath from_sensor_;

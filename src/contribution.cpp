@@ -7,9 +7,9 @@ namespace {
 struct FilmVisitor : ContributionVisitor<double> {
   Vec2d film;
 
-  void sensor(const Camera& camera, const Vec3d& v) {
-    ContributionVisitor<double>::sensor(camera, v);
-    film = camera.film_position(v);
+  void sensor(const Camera& camera, const Vec3d& v, const Vec3d& lens) {
+    ContributionVisitor<double>::sensor(camera, v, lens);
+    film = camera.film_position(v, lens);
   }
 };
 

@@ -50,19 +50,25 @@ class DensityVisitor : public WalkVisitor<T> {
         guide_(guide),
         emitter_(topology.emitter),
         scatter_count_(topology.scatter_count),
-        last_(constant<T>(scene.camera().origin)),
+        lens_(constant<T>(scene.camera().origin)),
+        last_(lens_),
         before_last_(last_),
         v0_(last_) {}
 
-  void sensor(const Camera& camera, const Vec3<T>& v) {
+  void lens(const Camera& camera, const Vec3<T>& p) {
+    lens_density = camera.lens_density();
+    last_ = p;
+  }
+  void sensor(const Camera& camera, const Vec3<T>& v, const Vec3<T>& lens) {
     using std::exp;
     importance = exp(camera.log_importance(v));
     v0_ = v;
+    lens_ = lens;
     at_sensor_ = true;
   }
   void depart_parallel(Ray<T>& ray) { last_ = ray.origin; }
   void position(const Shape&, const Vec3<T>& p) {
-    r2 = at_sensor_ ? scene_.camera().spread(v0_, p) : squared_distance(p, last_);
+    r2 = at_sensor_ ? scene_.camera().spread(v0_, p, lens_) : squared_distance(p, last_);
     at_sensor_ = false;
     before_last_ = last_;
     last_ = p;
@@ -154,7 +160,7 @@ class DensityVisitor : public WalkVisitor<T> {
   /// All vertices are known: their distances in order from the sensor.
   void joined(const T& squared) {
     measure /= squared;
-    vertices[0].r2 = scene_.camera().spread(v0_, vertices[0].p);
+    vertices[0].r2 = scene_.camera().spread(v0_, vertices[0].p, lens_);
     const Vec3<T>* from = &vertices[0].p;
     for (std::size_t k = 1; k < scatter_count_; ++k) {
       vertices[k].r2 = squared_distance(vertices[k].p, *from);
@@ -171,6 +177,7 @@ class DensityVisitor : public WalkVisitor<T> {
   }
 
   std::array<Vertex, kMaxPathLength> vertices;
+  double lens_density = 1;          ///< of the point on the lens, which all strategies draw
   T importance = constant<T>(1.0);  ///< C_0
   T r2 = constant<T>(1.0);          ///< of the last edge to a surface
   T measure = constant<T>(1.0);     ///< camera-side measure / (measure of the coordinates)
@@ -211,6 +218,7 @@ class DensityVisitor : public WalkVisitor<T> {
   std::uint32_t emitter_;
   std::size_t scatter_count_;
   std::size_t index_ = 0;
+  Vec3<T> lens_;                ///< where the first ray begins
   Vec3<T> last_, before_last_;  ///< of the positions visited
   Vec3<T> v0_;                  ///< coordinate of the first ray
   bool at_sensor_ = false;      ///< the next position is that of x_1
@@ -228,7 +236,7 @@ std::array<T, kMaxPathLength + 1> densities_by_light_vertices(const DensityVisit
   };
   // prefix[t] = C_0 .. C_{t-2}: the camera part of t vertices.
   std::array<T, kMaxPathLength + 2> prefix;
-  prefix[0] = prefix[1] = constant<T>(1.0);
+  prefix[0] = prefix[1] = constant<T>(path.lens_density);
   for (int t = 2; t <= n + 1; ++t)
     prefix[static_cast<std::size_t>(t)] = prefix[static_cast<std::size_t>(t - 1)] *
                                           (t == 2 ? path.importance : vertex(t - 2).forward);

@@ -16,9 +16,8 @@ Vec3d direction_before(const FoundPath& found, int i) {
 /// `count` surface vertices, each of which scatters but, for s > 0, the last.
 CameraPart camera_part(const Scene& scene, const FoundPath& found, PhaseSpace phase_space,
                        int count) {
-  CameraPart part{{}, RayFollower(scene, found.v), std::nullopt};
+  CameraPart part = begin_camera_part(scene, phase_space, found.v, found.lens);
   PathTopology& topology = part.path.topology;
-  topology.phase_space = phase_space;
   const bool scatter_last = found.s == 0;
   if (count > 0 || scatter_last) part.path.coordinates(topology.block_count++) = found.v;
   for (int i = 0; i < count; ++i) {

@@ -21,22 +21,23 @@ class LightTracer {
         max_depth_(max_depth) {}
 
   void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& sink) {
-    sink.add(directly_seen(scene_.camera().direction(film)));
+    const Vec3d lens = sample_lens(scene_.camera(), rng);
+    sink.add(directly_seen(scene_.camera().direction(film, lens), lens));
     const Emission emission = unguided_.sample(rng);
     tracer_.trace(Walk::FromLight, tracer_.leave_light(emission),
                   RayFollower(scene_, emission.origin, emission.start, emission.direction),
                   max_depth_ - 1, rng, subpath_);
     for (int i = 0; i < subpath_.size(); ++i) {
       if (!subpath_[i].connects) continue;
-      if (const auto seen = connect_to_sensor(scene_, subpath_[i]))
+      if (const auto seen = connect_to_sensor(scene_, subpath_[i], lens))
         sink.splat(seen->film, seen->value);
     }
   }
 
  private:
-  /// Radiance that emitters send along the camera ray of v.
-  Rgbd directly_seen(const Vec3d& v) const {
-    RayFollower follower(scene_, v);
+  /// Radiance that emitters send along the camera ray of v from a point of the lens.
+  Rgbd directly_seen(const Vec3d& v, const Vec3d& lens) const {
+    RayFollower follower(scene_, v, lens);
     const Hit hit = follower.next_hit();
     const auto end = hit.valid() ? light_end_at(scene_, follower.surface(hit))
                                  : light_end_toward(scene_, follower.ray().direction);

@@ -68,8 +68,9 @@ PathPoints points_of(const Scene& scene, const Sample& path) {
   PathPoints result;
   const PathTopology& topology = path.topology;
   if (topology.scatter_count == 0) return result;
-  Ray<double> ray = scene.camera().ray(path.coordinates(0));
-  int block = 1;
+  int block = topology.lens_block_count();
+  Ray<double> ray =
+      scene.camera().ray(path.coordinates(block++), lens_point(scene, topology, path.coordinates));
   for (std::size_t k = 0; k < topology.scatter_count; ++k) {
     const WalkVertex<double> x = arrive(scene, topology.vertices[k], ray);
     result.add(x.at.p, lobe_of(x.bsdf, x.vertex.delta));
@@ -93,7 +94,9 @@ std::optional<Sample> with_light_side(const Scene& scene, const Sample& path,
   topology.block_count = 0;
   Coordinates coordinates(points, result);
   const int camera_count = topology.camera_count();
-  if (camera_count > 0) coordinates.add(scene.camera().coordinate(coordinates.point(0)));
+  const Vec3d lens = lens_point(scene, topology, path.coordinates);
+  if (topology.has_lens) coordinates.add(lens);
+  if (camera_count > 0) coordinates.add(scene.camera().coordinate(coordinates.point(0), lens));
   for (int k = 0; k + 1 < camera_count; ++k) coordinates.add_free(k, k + 1);
   const int first = topology.scatter_count - 1;
   if (const auto* parallel = std::get_if<DirectionalEmitter>(&emitter)) {

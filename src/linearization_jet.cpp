@@ -83,7 +83,7 @@ class LocalGradients {
     std::array<LocalRow, 3> log_color;
   };
 
-  std::array<Entry, kMaxPathLength + 2> entries_;
+  std::array<Entry, kMaxStages> entries_;
   int count_ = 0;
   Rgbd color_{1, 1, 1};
   Rgbd shares_;

@@ -112,7 +112,8 @@ std::optional<Sample> join_in_light_chart(const Scene& scene, CameraPart& part,
   const bool to_sky = light.count == 0 && light.infinite;
   const Vec3d to = light.count > 0 ? light[light.count - 1].p : light.point.p;
   const Camera& camera = scene.camera();
-  Vec3d edge = to_sky ? light.sky : camera.ray(camera.coordinate(to)).direction;
+  const Vec3d& lens = lens_point(scene, topology, part.path.coordinates);
+  Vec3d edge = to_sky ? light.sky : camera.ray(camera.coordinate(to, lens), lens).direction;
   if (part.last && !to_sky) edge = to - part.last->at.p;
   if (part.last) {
     if (!passes(part.last->at, part.last->wi, edge)) return std::nullopt;
@@ -172,8 +173,9 @@ std::optional<Sample> connect(const Scene& scene, CameraPart& part, const LightP
   Vec3d edge = light.sky;
   Vec3d block = light.sky;
   if (!to_sky) {
-    block = part.last ? Vec3d((to - part.last->at.p).normalized()) : camera.coordinate(to);
-    edge = part.last ? block : camera.ray(block).direction;
+    const Vec3d& lens = lens_point(scene, topology, path.coordinates);
+    block = part.last ? Vec3d((to - part.last->at.p).normalized()) : camera.coordinate(to, lens);
+    edge = part.last ? block : camera.ray(block, lens).direction;
   }
   if (part.last) {
     if (!passes(part.last->at, part.last->wi, edge)) return std::nullopt;
@@ -188,6 +190,16 @@ std::optional<Sample> connect(const Scene& scene, CameraPart& part, const LightP
 }
 
 }  // namespace
+
+CameraPart begin_camera_part(const Scene& scene, PhaseSpace phase_space, const Vec3d& v,
+                             const Vec3d& lens) {
+  CameraPart part{{}, RayFollower(scene, v, lens), std::nullopt};
+  PathTopology& topology = part.path.topology;
+  topology.phase_space = phase_space;
+  topology.has_lens = scene.camera().has_lens();
+  if (topology.has_lens) part.path.coordinates(topology.block_count++) = lens;
+  return part;
+}
 
 std::optional<PathSampler::Sample> end_by_hit(const Scene& scene, CameraPart& part) {
   Sample& path = part.path;

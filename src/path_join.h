@@ -24,6 +24,10 @@ struct CameraPart {
   }
 };
 
+/// Nothing but the sensor, and the ray of the coordinate v from this point of its lens.
+CameraPart begin_camera_part(const Scene& scene, PhaseSpace phase_space, const Vec3d& v,
+                             const Vec3d& lens);
+
 /// Each uses up the camera part, and returns none if the path carries no light for certain.
 
 /// s = 0: the ray that leaves the camera part meets an emitter or the environment.

@@ -211,7 +211,8 @@ TraceStatus PathMutation::grow_from_sensor(VertexPath& y, int first, int count, 
       from.scattering = next->scattering;
       v = next->wo;
     }
-    RayFollower ray = k == 1 ? RayFollower(scene_, v) : leaving(scene_, y(k - 1).surface, v);
+    RayFollower ray = k == 1 ? RayFollower(scene_, v, scene_.camera().origin)
+                             : leaving(scene_, y(k - 1).surface, v);
     if (hits && k == y.edges) return end_by_hit(y, ray);
     const TraceStatus status = meet(ray, y(k).surface);
     if (status != TraceStatus::Ok) return status;
@@ -274,7 +275,9 @@ TraceStatus PathMutation::end_by_hit(VertexPath& y, RayFollower ray) const {
 /// vertex and itself, which a delta lobe has found again.
 TraceStatus PathMutation::joined(const VertexPath& y, int k) const {
   if (y.edges == 1) return TraceStatus::Missed;
-  if (k == 1) return sensor_sees(scene_, y(1).surface) ? TraceStatus::Ok : TraceStatus::Occluded;
+  if (k == 1)
+    return sensor_sees(scene_, y(1).surface, scene_.camera().origin) ? TraceStatus::Ok
+                                                                     : TraceStatus::Occluded;
   const SurfaceHit& from = y(k - 1).surface;
   const Interaction<double>& a = from.at;
   const auto leaves = [&](const Interaction<double>& x, const Vec3d& edge) {
@@ -332,7 +335,7 @@ TraceStatus PathMutation::from_sensor(const VertexPath& x, VertexPath& y,
 
   y.edges = x.edges;
   const int last = last_from_sensor(x);
-  RayFollower ray(scene_, camera.direction(film));
+  RayFollower ray(scene_, camera.direction(film), camera.origin);
   TraceStatus status = TraceStatus::Ok;
   for (int k = 1; k <= last && k < x.edges; ++k) {
     status = arrive_as(x, k, ray, y);

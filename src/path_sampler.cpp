@@ -14,10 +14,12 @@ namespace {
 /// Draws v_0 and `surface_vertices` vertices; the last of them scatters only if `scatter_last`.
 std::optional<CameraPart> sample_camera_part(const Scene& scene, PhaseSpace phase_space,
                                              int surface_vertices, bool scatter_last, Rng& rng) {
-  const Vec3d v = scene.camera().direction(rng.uniform2());
-  CameraPart part{{}, RayFollower(scene, v), std::nullopt};
+  const Camera& camera = scene.camera();
+  const Vec2d film = rng.uniform2();
+  const Vec3d lens = sample_lens(camera, rng);
+  const Vec3d v = camera.direction(film, lens);
+  CameraPart part = begin_camera_part(scene, phase_space, v, lens);
   PathTopology& topology = part.path.topology;
-  topology.phase_space = phase_space;
   if (surface_vertices == 0 && !scatter_last) return part;
   part.path.coordinates(topology.block_count++) = v;
   for (int k = 1; k <= surface_vertices; ++k) {

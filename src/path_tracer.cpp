@@ -16,9 +16,10 @@ class Estimator {
  public:
   Estimator(const Scene& scene, int max_depth) : scene_(scene), max_depth_(max_depth) {}
 
-  /// One estimate of the radiance along the camera ray v.
-  Rgbd radiance(const Vec3d& v, Rng& rng) const {
-    RayFollower follower(scene_, v);
+  Rgbd radiance(const Vec2d& film, Rng& rng) const {
+    const Camera& camera = scene_.camera();
+    const Vec3d lens = sample_lens(camera, rng);
+    RayFollower follower(scene_, camera.direction(film, lens), lens);
     Rgbd result = Rgbd::Zero();
     Rgbd throughput = Rgbd::Ones();
     LastBounce last;
@@ -168,8 +169,8 @@ class Estimator {
 
 }  // namespace
 
-Rgbd PathTracer::radiance(const Vec3d& v, Rng& rng) const {
-  return Estimator(scene_, max_depth_).radiance(v, rng);
+Rgbd PathTracer::radiance(const Vec2d& film, Rng& rng) const {
+  return Estimator(scene_, max_depth_).radiance(film, rng);
 }
 
 PixelSums::PixelSums(const Scene& scene, int max_depth, std::uint64_t seed)
@@ -215,7 +216,7 @@ void PixelSums::add(int x, int y, std::uint64_t index) {
   Rng rng(seed_, Stream::Pixel, index * sums_.size() + pixel);
   const Vec2d jitter = rng.uniform2();
   const Vec2d film{(x + jitter.x()) / camera_.film_width, (y + jitter.y()) / camera_.film_height};
-  const Rgbd sample = tracer_.radiance(camera_.direction(film), rng);
+  const Rgbd sample = tracer_.radiance(film, rng);
   const bool finite = sample.allFinite();
   if (!finite) ++non_finite_;
   if (!samples_.empty())

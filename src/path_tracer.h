@@ -19,8 +19,8 @@ class PathTracer {
  public:
   PathTracer(const Scene& scene, int max_depth) : scene_(scene), max_depth_(max_depth) {}
 
-  /// One estimate of the radiance along the camera ray of v, by paths of at most max_depth edges.
-  Rgbd radiance(const Vec3d& v, Rng& rng) const;
+  /// One estimate of the radiance at the film point, by paths of at most max_depth edges.
+  Rgbd radiance(const Vec2d& film, Rng& rng) const;
 
  private:
   const Scene& scene_;

@@ -40,17 +40,22 @@ class Tracer {
         pattern_(pattern),
         coordinates_(coordinates),
         result_(result),
-        follower_(scene, coordinates(0)) {
+        lens_(lens_point(scene, pattern, coordinates)),
+        next_block_(pattern.lens_block_count()),
+        v_(coordinates(next_block_++)),
+        follower_(scene, v_, lens_) {
     result_.scatter_count = pattern.scatter_count;
     result_.light_count = 0;
     result_.block_count = pattern.block_count;
+    result_.has_lens = pattern.has_lens;
     result_.phase_space = pattern.phase_space;
     result_.end = pattern.end;
     result_.emitter = pattern.emitter;
   }
 
   TraceStatus run() {
-    if (!scene_.camera().sees(coordinates_(0))) return TraceStatus::Missed;
+    if (pattern_.has_lens && !scene_.camera().is_on_lens(lens_)) return TraceStatus::Missed;
+    if (!scene_.camera().sees(v_, lens_)) return TraceStatus::Missed;
     for (int k = 0; k < pattern_.scatter_count; ++k) {
       const TraceStatus status = scatter(k);
       if (status != TraceStatus::Ok) return status;
@@ -149,8 +154,10 @@ class Tracer {
   const PathTopology& pattern_;
   const PathCoordinates& coordinates_;
   PathTopology& result_;
+  const Vec3d& lens_;
+  int next_block_;
+  const Vec3d& v_;  ///< coordinate of the first ray
   RayFollower follower_;
-  int next_block_ = 1;
   Lobe last_ = Lobe::Delta;  ///< of the last scattering vertex so far; a sensor connects to nothing
   std::array<Lobe, kMaxPathLength> lobes_;
 };
@@ -166,6 +173,13 @@ TraceStatus trace(const Scene& scene, const PathTopology& pattern,
 // ---- Chart ----------------------------------------------------------------------------------
 
 namespace {
+
+/// A block that is a point on the lens.
+void set_lens_point(const Camera& camera, Chart::Block& block) {
+  block.radius = 0.0;
+  block.normal = camera.forward;
+  block.length = camera.lens_radius;
+}
 
 /// A block that is a point on an emitter, or on the disk across parallel light.
 void set_point(const Scene& scene, const Emitter& emitter, Chart::Block& block) {
@@ -194,6 +208,7 @@ Chart::Chart(const Scene& scene, const PathTopology& topology, const PathCoordin
     block.normal = block.point;
     block.radius = 1.0;
     block.length = 1.0;
+    if (k < topology.lens_block_count()) set_lens_point(scene.camera(), block);
     if (k == point_block) set_point(scene, scene.emitters()[topology.emitter], block);
     const TangentBasis basis = tangent_basis(block.normal);
     block.t = block.length * basis.t;

@@ -50,9 +50,9 @@ class NumbersSampler {
   NumbersSampler(const StrategyTarget& target, const StrategyMethod& method)
       : target_(target), method_(method) {}
 
-  static Point point(std::uint64_t seed, std::size_t i, int edges) {
+  Point point(std::uint64_t seed, std::size_t i, int edges) const {
     Rng rng(seed, Stream::Bootstrap, i);
-    return {edges, rng};
+    return {edges, target_.has_lens(), rng};
   }
   double target(const Point& point) {
     if (common_options(method_).large_steps == StrategyLargeSteps::All) {

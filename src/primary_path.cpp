@@ -21,17 +21,26 @@ class PrimaryBlocks {
  public:
   PrimaryBlocks(const Scene& scene, const StrategyNumbers& numbers, const PrimaryPath& path,
                 const Steering& u)
-      : scene_(scene), numbers_(numbers), path_(path), u_(u) {
+      : scene_(scene),
+        numbers_(numbers),
+        path_(path),
+        u_(u),
+        lens_(numbers.has_lens() ? scene.camera().lens_point(Vec2<T>(u(0), u(1)))
+                                 : constant<T>(scene.camera().origin)) {
     if (path.strategy.s == 1)
       set_connection();
     else if (path.strategy.s > 1)
       set_emission();
   }
 
-  /// The coordinate of the first ray, and what leaves the emitter.
+  /// The point on the lens, the coordinate of the first ray, and what leaves the emitter.
   Vec3<T> operator()(int k) const {
-    const int t = path_.strategy.t;
-    if (k == 0 && t > 1) return scene_.camera().direction(Vec2<T>(u_(0), u_(1)));
+    const int lens_blocks = path_.topology.lens_block_count();
+    if (k < lens_blocks) return lens_;
+    if (k == lens_blocks && path_.strategy.t > 1) {
+      const int i = numbers_.film();
+      return scene_.camera().direction(Vec2<T>(u_(i), u_(i + 1)), lens_);
+    }
     const int first = path_.strategy.s > 1 ? path_.topology.camera_block_count() : k;
     return k == first && has_point_ ? ray_.from.p : ray_.direction;
   }
@@ -39,17 +48,14 @@ class PrimaryBlocks {
     const auto k = static_cast<int>(&x.vertex - path_.topology.vertices.data());
     const auto [s, t] = path_.strategy;
     if (s == 1 && k + 1 == path_.topology.scatter_count) return ray_.direction;
-    if (k < t - 1) return scattered(x, 2 + 2 * k, numbers_.sensor_lobe(k));
-    const int from_light = path_.topology.scatter_count - 1 - k;
-    return scattered(x, light_offset() + 4 + 2 * from_light, numbers_.light_lobe(from_light));
+    if (k < t - 1) return scattered(x, numbers_.sensor_vertex(k), numbers_.sensor_lobe(k));
+    const int j = path_.topology.scatter_count - 1 - k;
+    return scattered(x, numbers_.light_vertex(path_.strategy, j), numbers_.light_lobe(j));
   }
   const Vec3<T>& emitter_normal() const { return ray_.from.n; }
   const Vec2<T>& emitter_uv() const { return ray_.from.uv; }
 
  private:
-  /// Numbers of the subpath from the sensor.
-  int light_offset() const { return 2 * std::max(path_.strategy.t - 1, 0); }
-
   Vec3<T> scattered(const WalkVertex<T>& x, int i, double lobe) const {
     const auto next =
         warp<T>(x.bsdf, x.surface(), x.w, Vec3<T>(u_(i), u_(i + 1), constant<T>(lobe)));
@@ -58,8 +64,9 @@ class PrimaryBlocks {
   }
 
   void set_connection() {
-    const T u1 = u_(light_offset());
-    const T u2 = u_(light_offset() + 1);
+    const int i = numbers_.sensor_dimension(path_.strategy);
+    const T u1 = u_(i);
+    const T u2 = u_(i + 1);
     const Emitter& emitter = scene_.emitters()[path_.topology.emitter];
     if (const auto* area = std::get_if<AreaEmitter>(&emitter)) {
       ray_.from = warp_area(scene_.shapes()[area->shape], u1, u2);
@@ -69,7 +76,7 @@ class PrimaryBlocks {
     }
   }
   void set_emission() {
-    const int i = light_offset();
+    const int i = numbers_.sensor_dimension(path_.strategy);
     const std::array<T, 4> u{u_(i), u_(i + 1), u_(i + 2), u_(i + 3)};
     const Emitter& emitter = scene_.emitters()[path_.topology.emitter];
     has_point_ = !is_point(emitter);
@@ -87,6 +94,7 @@ class PrimaryBlocks {
   const StrategyNumbers& numbers_;
   const PrimaryPath& path_;
   const Steering& u_;
+  Vec3<T> lens_;
   EmittedRay<T> ray_;  ///< what there is of it
   bool has_point_ = false;
 };
@@ -126,7 +134,8 @@ struct ActiveNumbers {
   }
 };
 
-ActiveNumbers active_numbers(const Scene& scene, const PrimaryPath& path) {
+ActiveNumbers active_numbers(const Scene& scene, const StrategyNumbers& numbers,
+                             const PrimaryPath& path) {
   const auto [s, t] = path.strategy;
   const PathTopology& topology = path.topology;
   const Emitter& emitter = scene.emitters()[topology.emitter];
@@ -134,13 +143,15 @@ ActiveNumbers active_numbers(const Scene& scene, const PrimaryPath& path) {
   const auto add_vertex = [&](int k, int i) {
     if (!topology.vertices[static_cast<std::size_t>(k)].delta) active.add_pair(i);
   };
-  if (t > 1) active.add_pair(0);
-  for (int k = 0; k < t - 2; ++k) add_vertex(k, 2 + 2 * k);
-  const int offset = 2 * std::max(t - 1, 0);
+  const int offset = numbers.sensor_dimension(path.strategy);
+  if (numbers.has_lens()) active.add_pair(0);
+  if (t > 1) active.add_pair(numbers.film());
+  for (int k = 0; k < t - 2; ++k) add_vertex(k, numbers.sensor_vertex(k));
   const bool fixed = is_point(emitter) || std::holds_alternative<DirectionalEmitter>(emitter);
   if (s > 0 && !fixed) active.add_pair(offset);
   if (s > 1) active.add_pair(offset + 2);
-  for (int j = 0; j < s - 2; ++j) add_vertex(topology.scatter_count - 1 - j, offset + 4 + 2 * j);
+  for (int j = 0; j < s - 2; ++j)
+    add_vertex(topology.scatter_count - 1 - j, numbers.light_vertex(path.strategy, j));
   return active;
 }
 
@@ -167,7 +178,7 @@ PathEnd end_of(const Emitter& emitter, int s) {
 int count_blocks(const PathTopology& topology, int s) {
   int count = topology.camera_block_count();
   if (!topology.has_light_side()) {
-    count = 1;
+    count = topology.lens_block_count() + 1;
     for (int k = 0; k < topology.scatter_count; ++k)
       if (!topology.vertices[static_cast<std::size_t>(k)].delta) ++count;
     return topology.ends_at_delta_emitter() ? count - 1 : count;
@@ -184,7 +195,8 @@ int count_blocks(const PathTopology& topology, int s) {
 
 // ---- StrategyNumbers ------------------------------------------------------------------------
 
-StrategyNumbers::StrategyNumbers(int edges, Rng& rng) : edges_(edges) {
+StrategyNumbers::StrategyNumbers(int edges, bool has_lens, Rng& rng)
+    : edges_(edges), lens_(has_lens ? 2 : 0) {
   for (int i = 0; i < count(); ++i) numbers_[static_cast<std::size_t>(i)] = rng.uniform();
 }
 
@@ -195,10 +207,12 @@ Strategy StrategyNumbers::strategy() const {
 }
 
 std::size_t StrategyNumbers::index(const Strategy& strategy, int i) const {
-  const int from_sensor = 2 * std::max(strategy.t - 1, 0);
+  const int from_sensor = sensor_dimension(strategy);
+  const int vertices = sensor_vertex(0);
   const auto place = [&] {
-    if (i < 2 && i < from_sensor) return kSensor + i;
-    if (i < from_sensor) return kSensor + 2 + 3 * ((i - 2) / 2) + i % 2;
+    if (i < lens_) return kSensor + 2 + i;
+    if (i < vertices && i < from_sensor) return kSensor + i - lens_;
+    if (i < from_sensor) return kSensor + vertices + 3 * ((i - vertices) / 2) + i % 2;
     const int j = i - from_sensor;
     if (strategy.s == 1) return connection_begin() + 1 + j;
     if (j < 4) return light_begin() + 1 + j;
@@ -223,7 +237,8 @@ void StrategyNumbers::move_within(const Strategy& strategy, const PrimaryOptions
     }
   };
   const auto [s, t] = strategy;
-  if (t > 1) move_range(kSensor, 2 + 3 * (t - 2));
+  if (t > 1) move_range(kSensor, 2 + lens_ + 3 * (t - 2));
+  if (t == 1) move_range(kSensor + 2, lens_);
   if (s > 1) move_range(light_begin(), 5 + 3 * (s - 2));
   if (s == 1) move_range(connection_begin(), kConnection);
 }
@@ -232,7 +247,7 @@ void StrategyNumbers::move_choices(const Strategy& strategy, const PrimaryOption
                                    Rng& rng) {
   const StrategyNumbers before = *this;
   move_within(strategy, options, rng);
-  for (int i = 0; i < dimension(strategy.edges()); ++i)
+  for (int i = 0; i < dimension(strategy); ++i)
     steering(strategy, i) = before.steering(strategy, i);
 }
 
@@ -242,6 +257,7 @@ PrimaryPath primary_path(const Scene& scene, const FoundPath& found) {
   PrimaryPath path{{found.s, found.t}, {}};
   PathTopology& topology = path.topology;
   topology.emitter = found.end.emitter;
+  topology.has_lens = scene.camera().has_lens();
   const auto add = [&](const SubpathVertex& x, const Vec3d& onward, bool connects) {
     PathVertex& vertex = topology.vertices[topology.scatter_count++];
     vertex.hit = x.surface.hit;
@@ -281,8 +297,8 @@ bool PrimaryFunction::gradient(const StrategyNumbers& numbers, const PrimaryPath
                                PrimaryDerivatives& result) const {
   constexpr int kPass = 8;
   using T = ceres::Jet<double, kPass>;
-  const ActiveNumbers active = active_numbers(scene_, path);
-  result.gradient.setZero(StrategyNumbers::dimension(path.strategy.edges()));
+  const ActiveNumbers active = active_numbers(scene_, numbers, path);
+  result.gradient.setZero(numbers.dimension(path.strategy));
   for (int first = 0; first < active.count; first += kPass) {
     const auto u = [&](int i) {
       T x(numbers.steering(path.strategy, i));
@@ -302,8 +318,8 @@ bool PrimaryFunction::gradient_and_hessian(const StrategyNumbers& numbers, const
   constexpr int kWidth = 4;
   using Inner = ceres::Jet<double, kWidth>;
   using T = ceres::Jet<Inner, kWidth>;
-  const ActiveNumbers active = active_numbers(scene_, path);
-  const int d = StrategyNumbers::dimension(path.strategy.edges());
+  const ActiveNumbers active = active_numbers(scene_, numbers, path);
+  const int d = numbers.dimension(path.strategy);
   result.gradient.setZero(d);
   result.hessian.setZero(d, d);
   for (int outer = 0; outer < active.count; outer += kWidth) {

@@ -3,12 +3,13 @@
 ///
 /// Of one strategy (s, t) of bidirectional path tracing the numbers that steer a path are, two for
 /// each,
+///   the point on the lens                                    (if there is one),
 ///   the film point, and the directions at x_1 .. x_(t-2)               (t > 1),
 ///   the emitted ray, four, and the directions at x_(n-1) .. x_(t+1)    (s > 1),
 ///   the point on the emitter                                           (s = 1),
-/// 2 n in all for any strategy at paths of n edges. Those of a delta vertex, or of a point
-/// emitter's position, steer nothing. The others choose: the emitter, the lobe at each vertex, the
-/// strategy.
+/// 2 n in all for any strategy at paths of n edges, 2 n + 2 with a lens. Those of a delta vertex,
+/// or of a point emitter's position, steer nothing. The others choose: the emitter, the lobe at
+/// each vertex, the strategy.
 ///
 /// With the balance heuristic the target is
 ///   I(u) = (n + 1) w_s f / p_s = (n + 1) f(X) / sum_s' p_s'(X),   X = X(u),
@@ -16,6 +17,7 @@
 /// given choices a smooth function of the numbers.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <optional>
 
@@ -37,21 +39,31 @@ struct Strategy {
 /// All numbers that strategies of paths of so many edges, or fewer, may ask for.
 class StrategyNumbers {
  public:
-  /// Numbers that steer a path.
-  static int dimension(int edges) { return 2 * edges; }
-
   StrategyNumbers() = default;
-  /// Uniform.
-  StrategyNumbers(int edges, Rng& rng);
+  /// Uniform, for a camera with or without a lens.
+  StrategyNumbers(int edges, bool has_lens, Rng& rng);
 
   int edges() const { return edges_; }
+  bool has_lens() const { return lens_ > 0; }
+  /// How many steer a path of the strategy, and the path's subpath from the sensor.
+  int dimension(const Strategy& strategy) const { return lens_ + 2 * strategy.edges(); }
+  int sensor_dimension(const Strategy& strategy) const {
+    return lens_ + 2 * std::max(strategy.t - 1, 0);
+  }
+  /// The first of those of the film point, and of vertex i of the subpath from the sensor and from
+  /// the light.
+  int film() const { return lens_; }
+  int sensor_vertex(int i) const { return lens_ + 2 + 2 * i; }
+  int light_vertex(const Strategy& strategy, int i) const {
+    return sensor_dimension(strategy) + 4 + 2 * i;
+  }
   /// Of so many edges, chosen by a number of its own.
   Strategy strategy() const;
   /// Number i of those that steer a path of the strategy, in the order above.
   double& steering(const Strategy& strategy, int i) { return numbers_[index(strategy, i)]; }
   double steering(const Strategy& strategy, int i) const { return numbers_[index(strategy, i)]; }
   /// That which chooses the lobe at vertex i of the subpath from the sensor, or from the light.
-  double sensor_lobe(int i) const { return at(kSensor + 4 + 3 * i); }
+  double sensor_lobe(int i) const { return at(kSensor + lens_ + 4 + 3 * i); }
   double light_lobe(int i) const { return at(light_begin() + 7 + 3 * i); }
   /// Moves all of them as PrimarySample does.
   void move(const PrimaryOptions& options, Rng& rng);
@@ -82,12 +94,12 @@ class StrategyNumbers {
   Reader connection() const { return Reader(&at(connection_begin()), kConnection); }
 
  private:
-  // Places of the numbers: the strategy; the film, then three for each vertex; the emitter and the
-  // ray, then likewise; the emitter and the point.
+  // Places of the numbers: the strategy; the film, the lens, then three for each vertex; the
+  // emitter and the ray, then likewise; the emitter and the point.
   static constexpr int kSensor = 1;
   static constexpr int kConnection = 3;  ///< of a connection
-  static constexpr int kMaxCount = 1 + 7 + 6 * kMaxPathLength + 3;
-  int light_begin() const { return kSensor + 2 + 3 * edges_; }
+  static constexpr int kMaxCount = 1 + 9 + 6 * kMaxPathLength + 3;
+  int light_begin() const { return kSensor + 2 + lens_ + 3 * edges_; }
   int connection_begin() const { return light_begin() + 5 + 3 * edges_; }
   int count() const { return connection_begin() + kConnection; }
 
@@ -95,6 +107,7 @@ class StrategyNumbers {
   std::size_t index(const Strategy& strategy, int i) const;
 
   int edges_ = 0;
+  int lens_ = 0;  ///< numbers of the point on the lens
   std::array<double, kMaxCount> numbers_{};
 };
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "driftlight/phase_space.h"
+#include "driftlight/random.h"
 
 namespace driftlight {
 
@@ -21,12 +22,17 @@ struct SurfaceHit {
   }
 };
 
+/// A point on the lens, uniform; without one the origin, and no numbers are drawn.
+inline Vec3d sample_lens(const Camera& camera, Rng& rng) {
+  return camera.has_lens() ? camera.lens_point(rng.uniform2()) : camera.origin;
+}
+
 class RayFollower {
  public:
-  /// Starts at the sensor, v the coordinate of the ray there.
-  RayFollower(const Scene& scene, const Vec3d& v)
+  /// Starts at the sensor, at this point of its lens; v is the coordinate of the ray there.
+  RayFollower(const Scene& scene, const Vec3d& v, const Vec3d& lens)
       : scene_(scene),
-        ray_(scene.camera().ray(v)),
+        ray_(scene.camera().ray(v, lens)),
         start_(ray_.origin),
         t_min_(scene.camera().near_clip / scene.camera().cosine(ray_.direction)),
         t_max_(scene.camera().far_clip / scene.camera().cosine(ray_.direction)) {}

@@ -8,8 +8,9 @@
 
 namespace driftlight {
 
-/// Whether the sensor sees the surface point, through its film and past the near plane.
-bool sensor_sees(const Scene& scene, const SurfaceHit& x);
+/// Whether the sensor sees the surface point from this point of its lens, through its film and past
+/// the near plane.
+bool sensor_sees(const Scene& scene, const SurfaceHit& x, const Vec3d& lens);
 
 struct SensorConnection {
   Vec2d film{0, 0};     ///< in [0, 1)^2
@@ -18,10 +19,11 @@ struct SensorConnection {
   double density = 0;   ///< of the vertex, per area, by rays from the sensor
 };
 
-/// None if the vertex, which is not a delta one, is not seen or scatters nothing to the sensor. The
-/// value is
+/// From a uniform point of the lens. None if the vertex, which is not a delta one, is not seen or
+/// scatters nothing to the sensor. The value is
 ///   throughput f_s |n_s . wo| |n_g . wi| / (|n_g . wo| r^2) W,   W = 1 / (A cos^3),
 /// where the throughput is that of SubpathTracer.
-std::optional<SensorConnection> connect_to_sensor(const Scene& scene, const SubpathVertex& y);
+std::optional<SensorConnection> connect_to_sensor(const Scene& scene, const SubpathVertex& y,
+                                                  const Vec3d& lens);
 
 }  // namespace driftlight

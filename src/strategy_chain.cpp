@@ -63,7 +63,7 @@ void StrategyChain::mutate() {
 }
 
 double StrategyChain::propose_large() {
-  proposed_.numbers = StrategyNumbers(edges(), rng_);
+  proposed_.numbers = StrategyNumbers(edges(), current_.numbers.has_lens(), rng_);
   if (options_.large_steps == StrategyLargeSteps::One) {
     look(proposed_.numbers.strategy());
     weights_.add((edges() + 1) * deposits_.proposed.target);
@@ -134,7 +134,7 @@ void StrategyChain::derive(Point& point) {
   if (const auto* h2mc = std::get_if<H2mcOptions>(&method_)) {
     const bool finite =
         target_.function().gradient_and_hessian(point.numbers, *point.path, derivatives_);
-    const int d = StrategyNumbers::dimension(point.strategy().edges());
+    const int d = point.numbers.dimension(point.strategy());
     point.step =
         finite ? GaussianStep::hamiltonian(derivatives_.gradient, derivatives_.hessian, h2mc->sigma)
                : GaussianStep::isotropic(d, h2mc->sigma);
@@ -151,7 +151,7 @@ GaussianStep StrategyChain::step_at(const Point& point) const {
   if (lmc == nullptr) return point.step;
   const auto [s, t] = point.strategy();
   if (point.gradient.size() == 0)
-    return GaussianStep::isotropic(StrategyNumbers::dimension(s + t - 1), lmc->sigma);
+    return GaussianStep::isotropic(point.numbers.dimension(point.strategy()), lmc->sigma);
   const auto memory = memories_.find({s, t});
   return (memory != memories_.end() ? memory->second : GradientMemory()).step(point.gradient, *lmc);
 }

@@ -33,6 +33,8 @@ class StrategyTarget {
   std::optional<Choice> sample(const StrategyNumbers& numbers, Rng& rng, PrimaryPlace& place);
 
   const PrimaryFunction& function() const { return function_; }
+  /// Whether numbers are to have a point on the lens.
+  bool has_lens() const { return scene_.camera().has_lens(); }
   /// Since they were last taken.
   std::uint64_t take_non_finite() { return std::exchange(non_finite_, 0); }
 

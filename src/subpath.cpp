@@ -44,16 +44,16 @@ ScatteringDensities delta_event(const SurfaceHit& x, const Vec3d& wi, const Vec3
 
 /// v is uniform over the film: its density is the importance W(v), by area across parallel rays
 /// that over Camera::spread. No strategy gives up the sensor.
-Departure SubpathTracer::leave_sensor(const Vec3d& v) const {
+Departure SubpathTracer::leave_sensor(const Vec3d& v, const Vec3d& lens) const {
   const Camera& camera = scene_.camera();
-  const Ray<double> ray = camera.ray(v);
+  const Ray<double> ray = camera.ray(v, lens);
   Departure from;
   from.p = ray.origin;
   from.direction = ray.direction;
   from.density = std::exp(camera.log_importance(v));
   if (camera.is_orthographic()) {
     from.parallel = true;
-    from.density /= camera.spread(v, ray.origin);
+    from.density /= camera.spread(v, ray.origin, lens);
   }
   from.throughput = Rgbd::Ones();
   from.others = 0.0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Subpaths from the sensor and from the light, and how much of a path each strategy gets.
+/// Subpaths from the sensor and from the light, and how much of a path each strategy gets. The
+/// sensor's lens is what one point of it makes of it: all strategies draw that point alike.
 ///
 /// A path x_0 .. x_n runs from the sensor to the light. Strategy (s, t), s + t = n + 1, walks to
 /// x_0 .. x_(t-1) from the sensor and to x_n .. x_t from the light, and joins the two by the edge
@@ -104,9 +105,9 @@ class SubpathTracer {
                 Roulette roulette = Roulette::On)
       : scene_(scene), guide_(guide), power_(heuristic), roulette_(roulette) {}
 
-  /// Leaves the sensor by the ray of the coordinate v. Its throughput makes the path an estimate of
-  /// the radiance there.
-  Departure leave_sensor(const Vec3d& v) const;
+  /// Leaves the sensor at this point of its lens, by the ray of the coordinate v. Its throughput
+  /// makes the path an estimate of the radiance there.
+  Departure leave_sensor(const Vec3d& v, const Vec3d& lens) const;
   /// Leaves the light along a ray.
   Departure leave_light(const Emission& emission) const;
   /// Comes to a surface.

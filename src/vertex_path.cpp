@@ -25,7 +25,7 @@ bool VertexPath::evaluate(const Scene& scene) {
   const LightEdge last = edge_to(end, from);
   inverse_r2[n] = last.inverse_r2;
   directions_[n - 1] = last.direction;
-  if (!last.lit() || !camera.sees(directions_[0])) return false;
+  if (!last.lit() || !camera.sees(directions_[0], camera.origin)) return false;
 
   forward_[0] = camera.log_importance(directions_[0]);
   Rgbd color = end.emitted;
@@ -50,7 +50,8 @@ bool VertexPath::evaluate(const Scene& scene) {
   backward_[n] = std::log(emission_density(scene, end, last.cosine, last.falloff));
   log_end_ = std::log(end.density);
   const double y = luminance(color);
-  contribution_ = {log_f + std::log(y), color / y, camera.film_position(directions_[0])};
+  contribution_ = {log_f + std::log(y), color / y,
+                   camera.film_position(directions_[0], camera.origin)};
   return y > 0.0;
 }
 
@@ -120,9 +121,10 @@ class VertexVisitor : public WalkVisitor<double> {
 }  // namespace
 
 void require_pinhole(const Scene& scene, const std::string& integrator) {
-  if (scene.camera().is_orthographic())
-    throw InputError("the integrator '" + integrator +
-                     "' needs a perspective sensor; this scene's is orthographic");
+  const Camera& camera = scene.camera();
+  if (camera.is_orthographic() || camera.has_lens())
+    throw InputError("the integrator '" + integrator + "' needs a pinhole; this scene's sensor " +
+                     (camera.has_lens() ? "has a lens" : "is orthographic"));
 }
 
 VertexPath vertex_path(const Scene& scene, const PathSampler::Sample& sample) {

@@ -21,9 +21,13 @@ struct VisitorPair : WalkVisitor<T> {
   explicit VisitorPair(std::in_place_t, Arguments&&... arguments)
       : second(std::forward<Arguments>(arguments)...) {}
 
-  void sensor(const Camera& camera, const Vec3<T>& v) {
-    first.sensor(camera, v);
-    second.sensor(camera, v);
+  void lens(const Camera& camera, const Vec3<T>& p) {
+    first.lens(camera, p);
+    second.lens(camera, p);
+  }
+  void sensor(const Camera& camera, const Vec3<T>& v, const Vec3<T>& lens) {
+    first.sensor(camera, v, lens);
+    second.sensor(camera, v, lens);
   }
   void depart_parallel(Ray<T>& ray) {
     first.depart_parallel(ray);

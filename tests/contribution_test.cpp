@@ -199,7 +199,10 @@ TEST(Contribution, SumOfLogarithmsEqualsTheProduct) {
     void multiply(const ScaledColor<double>& factor) {
       f *= std::exp(factor.log_scale) * factor.color;
     }
-    void sensor(const Camera& camera, const Vec3d& v) {
+    void lens(const Camera& camera, const Vec3d&) {
+      f /= kPi * camera.lens_radius * camera.lens_radius;
+    }
+    void sensor(const Camera& camera, const Vec3d& v, const Vec3d&) {
       f *= 1.0 / (camera.area() * std::pow(camera.forward.dot(v), 3));
     }
     void scatter(const ScatterEvent<double>& e) { multiply(eval(e.bsdf, e.surface(), e.wi, e.wo)); }

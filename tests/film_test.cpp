@@ -205,7 +205,7 @@ TEST(Film, IntegratorsShareTheFilter) {
   camera.filter = {Kind::Cubic, 2.0};
   builder.set_camera(camera);
   const Scene scene = builder.build();
-  const bool left = camera.film_position(Vec3d(-1, 0, -3)).x() < 0.5;
+  const bool left = camera.film_position(Vec3d(-1, 0, -3), camera.origin).x() < 0.5;
   const auto check = [&](const std::string& name, const Image& image, double tolerance) {
     for (int x = 0; x < 8; ++x) {
       const double lit = left ? camera.filter.integral(-x - 0.5, 3.5 - x)

@@ -73,6 +73,7 @@ LoadedScene bidirectional_scene(const std::string& name) {
   if (name == "limelight") return {limelight(), 5, {}};
   if (name == "coated") return {test::coated(false), 5, {}};
   if (name == "plan") return {test::plan(false), 5, {}};
+  if (name == "lens") return {test::lens(false), 5, {}};
   if (name == "ring_caustic") return load_small(name, {{"alpha", "0.2"}});
   if (name == "glass_caustic") return load_small(name, {{"light", "0.6"}});
   return load_small(name);
@@ -121,7 +122,8 @@ INSTANTIATE_TEST_SUITE_P(Scenes, BidirectionalEqualsPath,
                                          BidirectionalWork{"ring_caustic", 128, 48, 128, 0.02},
                                          BidirectionalWork{"limelight", 48, 24, 96, 0.02},
                                          BidirectionalWork{"coated", 96, 24, 0, 0.04},
-                                         BidirectionalWork{"plan", 96, 24, 0, 0.04}),
+                                         BidirectionalWork{"plan", 96, 24, 0, 0.04},
+                                         BidirectionalWork{"lens", 64, 24, 96, 0.04}),
                          [](const auto& instance) { return std::string(instance.param.scene); });
 
 /// A closed sphere of radiance L and albedo rho shows L (1 - rho^n) / (1 - rho) everywhere.

@@ -39,6 +39,7 @@ const std::map<std::string, Work>& works() {
       {"limelight", {256, 200, 100000, 0.02}},
       {"coated", {256, 200, 200000, 0.05}},
       {"plan", {256, 200, 200000, 0.05}},
+      {"lens", {256, 200, 200000, 0.05}},
       {"sun_pane", {600, 200, 100000, 0.05}},
       {"lamp_in_glass", {1500, 200, 200000, 0.12}}};
   return kWorks;
@@ -107,6 +108,7 @@ LoadedScene load_scene_of(const std::string& name) {
   if (name == "limelight") return {test::limelight(), 5, {}};
   if (name == "coated") return {test::coated(false), 5, {}};
   if (name == "plan") return {test::plan(false), 5, {}};
+  if (name == "lens") return {test::lens(false), 5, {}};
   if (name == "sun_pane") return sun_pane_in_haze();
   if (name == "lamp_in_glass") return load_small(name, {{"filament", "0.1"}});
   if (name == "ring_caustic") return load_small(name, {{"alpha", "0.2"}});
@@ -183,7 +185,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"lamp_in_glass", "two_levels"}, Case{"coated", "gradient"},
                     Case{"ring_caustic", "hessian"}, Case{"limelight", "diagonal"},
                     Case{"coated", "redistribution_both_ends"}, Case{"plan", "gradient"},
-                    Case{"plan", "both_ends"}),
+                    Case{"plan", "both_ends"}, Case{"lens", "both_ends"},
+                    Case{"lens", "redistribution"}),
     name_of);
 
 /// All of them, but for an island of glass_caustic, the lamp's reflection, that one strategy alone
@@ -234,7 +237,7 @@ TEST_P(PrimaryEqualsPath, TileMeans) {
 INSTANTIATE_TEST_SUITE_P(Some, PrimaryEqualsPath,
                          testing::Values(Case{"cornell_glossy", "mmlt"},
                                          Case{"limelight", "pssmlt"}, Case{"limelight", "h2mc"},
-                                         Case{"cornell_glossy", "lmc"}),
+                                         Case{"cornell_glossy", "lmc"}, Case{"lens", "lmc"}),
                          name_of);
 
 std::vector<Case> all_primary_cases() {
@@ -287,11 +290,11 @@ INSTANTIATE_TEST_SUITE_P(Some, MutationsEqualPath,
                          testing::Values(Case{"limelight", "mlt"}, Case{"limelight", "erpt"}),
                          name_of);
 
-/// All that a perspective sensor sees.
+/// All that a pinhole sees.
 std::vector<Case> all_mutation_cases() {
   std::vector<Case> cases;
   for (const auto& scene : works())
-    if (scene.first != "plan")
+    if (scene.first != "plan" && scene.first != "lens")
       for (const char* name : {"mlt", "erpt"}) cases.emplace_back(scene.first, name);
   return cases;
 }

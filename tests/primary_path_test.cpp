@@ -37,7 +37,7 @@ std::vector<Found> found_paths(const Scene& scene, int count, int tries, std::ui
   std::vector<Found> result;
   for (std::uint64_t i = 0; i < static_cast<std::uint64_t>(tries); ++i) {
     Rng rng(seed, Stream::Test, i);
-    const StrategyNumbers numbers(1 + static_cast<int>(i % 6), rng);
+    const StrategyNumbers numbers(1 + static_cast<int>(i % 6), target.has_lens(), rng);
     const auto [s, t] = numbers.strategy();
     if (counts[{s, t}] >= count) continue;
     const auto path = target(numbers, numbers.strategy(), place);
@@ -86,7 +86,7 @@ TEST(PrimaryPath, SampleIsTheSumOfItsStrategies) {
     int count = 0;
     for (std::uint64_t i = 0; i < 1500; ++i) {
       Rng rng(17, Stream::Test, i);
-      const StrategyNumbers numbers(6, rng);
+      const StrategyNumbers numbers(6, target.has_lens(), rng);
       const auto choice = target.sample(numbers, rng, sample);
       std::vector<double> parts;
       double chosen = 0;

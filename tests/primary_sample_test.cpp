@@ -144,7 +144,7 @@ TEST(StrategyTarget, HasTheIntegralOfAClosedFurnace) {
     Moments one;
     for (std::uint64_t i = 0; i < 20000; ++i) {
       Rng rng(4, Stream::Test, i);
-      const StrategyNumbers numbers(n, rng);
+      const StrategyNumbers numbers(n, target.has_lens(), rng);
       target(numbers, numbers.strategy(), place);
       one.add((n + 1) * place.target);
     }
@@ -156,7 +156,7 @@ TEST(StrategyTarget, HasTheIntegralOfAClosedFurnace) {
   Moments all;
   for (std::uint64_t i = 0; i < 20000; ++i) {
     Rng rng(4, Stream::Test, i);
-    target.sample(StrategyNumbers(5, rng), rng, place);
+    target.sample(StrategyNumbers(5, target.has_lens(), rng), rng, place);
     all.add(place.target);
   }
   const double expected = std::pow(albedo, 2) + std::pow(albedo, 3) + std::pow(albedo, 4);

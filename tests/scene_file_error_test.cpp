@@ -375,6 +375,13 @@ const Fault kSensorFaults[] = {
      R"(@<transform name="toWorld"><matrix value="1 1 0 0 0 1 0 0 0 0 1 0 0 0 0 1"/></transform>)"
      "</sensor>",
      {"shear"}},
+    {"LensWithoutRadius",
+     R"(@<sensor type="thinlens"><film type="hdrfilm"/></sensor>)",
+     {"'thinlens'", "apertureRadius"}},
+    {"NegativeLens",
+     R"(<sensor type="thinlens"><film type="hdrfilm"/>@<float name="apertureRadius" value="-1"/>)"
+     "</sensor>",
+     {"'apertureRadius'"}},
     {"ClipPlanes",
      R"(<sensor type="perspective"><film type="hdrfilm"><rfilter type="box"/></film>)"
      R"(@<float name="nearClip" value="5"/><float name="farClip" value="5"/></sensor>)",

@@ -19,16 +19,18 @@ using test::lit;
 using test::scene_file;
 using test::SceneDirectory;
 
-std::string sensor(const std::string& properties, int width = 200, int height = 100) {
-  return R"(<sensor type="perspective">)" + properties + R"(<film type="hdrfilm">)" +
+std::string sensor(const std::string& properties, int width = 200, int height = 100,
+                   const std::string& type = "perspective") {
+  return R"(<sensor type=")" + type + R"(">)" + properties + R"(<film type="hdrfilm">)" +
          R"(<integer name="width" value=")" + std::to_string(width) + R"("/>)" +
          R"(<integer name="height" value=")" + std::to_string(height) + R"("/>)" +
          R"(<rfilter type="box"/></film></sensor>)";
 }
 
-Camera load_camera(const std::string& properties, int width = 200, int height = 100) {
+Camera load_camera(const std::string& properties, int width = 200, int height = 100,
+                   const std::string& type = "perspective") {
   const SceneDirectory directory;
-  const std::string text = scene_file(sensor(properties, width, height) + kEmitter + kShape);
+  const std::string text = scene_file(sensor(properties, width, height, type) + kEmitter + kShape);
   return directory.load(text).scene.camera();
 }
 
@@ -151,10 +153,11 @@ TEST(SensorXml, CropsTheFilm) {
   for (const Vec2d& pixel : {Vec2d(0, 0), Vec2d(3.5, 1.25), Vec2d(19.9, 5.9)}) {
     const Vec3d v = part.direction({pixel.x() / 20, pixel.y() / 6});
     expect_near(v, whole.direction({(12 + pixel.x()) / 40, (4 + pixel.y()) / 30}));
-    EXPECT_LT((part.film_position(v) - Vec2d(pixel.x() / 20, pixel.y() / 6)).norm(), 1e-12);
-    EXPECT_TRUE(part.sees(v));
+    EXPECT_LT((part.film_position(v, part.origin) - Vec2d(pixel.x() / 20, pixel.y() / 6)).norm(),
+              1e-12);
+    EXPECT_TRUE(part.sees(v, part.origin));
   }
-  EXPECT_FALSE(part.sees(whole.direction({11.9 / 40, 0.2})));
+  EXPECT_FALSE(part.sees(whole.direction({11.9 / 40, 0.2}), part.origin));
   EXPECT_NEAR(part.area(), whole.area() * 120 / 1200, 1e-12);
 }
 
@@ -198,7 +201,7 @@ TEST(SensorXml, ShiftsTheFilm) {
   for (const Vec2d& film : {Vec2d(0.5, 0.5), Vec2d(0.1, 0.8)}) {
     const Vec3d v = shifted.direction(film);
     expect_near(v, plain.direction(Vec2d(film + Vec2d(0.25, -0.1))));
-    EXPECT_LT((shifted.film_position(v) - film).norm(), 1e-12);
+    EXPECT_LT((shifted.film_position(v, shifted.origin) - film).norm(), 1e-12);
   }
 }
 
@@ -219,11 +222,36 @@ TEST(SensorXml, ReadsOrthographicSensors) {
                              200, 100);
   EXPECT_TRUE(camera.is_orthographic());
   for (const Vec2d& film : {Vec2d(0.5, 0.5), Vec2d(0.0, 0.0), Vec2d(1.0, 0.25)}) {
-    const Ray<double> ray = camera.ray<double>(camera.direction(film));
+    const Ray<double> ray = camera.ray<double>(camera.direction(film), camera.origin);
     expect_near(ray.direction, Vec3d(0, 0, -1));
     expect_near(ray.origin, Vec3d(1 + 10 * (2 * film.x() - 1), 2 + 2.5 * (1 - 2 * film.y()), 3));
   }
   EXPECT_NEAR(camera.area() * camera.scale * camera.scale, 20.0 * 5.0, 1e-9);
+}
+
+// Law: all rays of a film point of a thinlens meet where it is in focus, which the pinhole sees
+// there.
+TEST(SensorXml, ReadsThinLenses) {
+  const std::string fov = R"(<float name="fov" value="70"/>)";
+  const Camera pinhole = load_camera(fov);
+  const Camera camera = load_camera(fov + R"(<float name="apertureRadius" value="0.3"/>
+                                             <float name="focusDistance" value="7"/>)",
+                                    200, 100, "thinlens");
+  EXPECT_EQ(camera.lens_radius, 0.3);
+  EXPECT_EQ(camera.focus_depth, 7);
+  for (const Vec2d& film : {Vec2d(0.5, 0.5), Vec2d(0.1, 0.8)}) {
+    const Vec3d v = pinhole.direction(film);
+    const Vec3d focus = pinhole.origin + 7.0 / pinhole.cosine(v) * v;
+    for (const Vec2d& u : {Vec2d(0.2, 0.7), Vec2d(0.99, 0.1)}) {
+      const Vec3d lens = camera.lens_point(u);
+      EXPECT_NEAR((lens - camera.origin).norm(), 0.3 * std::sqrt(u.x()), 1e-12);
+      expect_near(camera.direction(film, lens), (focus - lens).normalized());
+    }
+  }
+  // As far as one sees, if the file does not say.
+  const Camera far =
+      load_camera(R"(<float name="apertureRadius" value="0.3"/>)", 200, 100, "thinlens");
+  EXPECT_EQ(far.focus_depth, far.far_clip);
 }
 
 TEST(SensorXml, LooksAtItsTarget) {

@@ -19,7 +19,8 @@ namespace {
 
 /// A path with its light end. Directions v_k lead from x_k to x_(k+1).
 struct GivenPath {
-  Vec3d coordinate;                    ///< of the sensor's ray
+  Vec3d lens;                          ///< where the sensor's ray begins
+  Vec3d coordinate;                    ///< of that ray
   std::vector<SurfaceHit> scattering;  ///< x_1 .. x_(n-1), wi toward the sensor
   std::vector<Vec3d> v;                ///< v_0 .. v_(n-1)
   LightEnd end;
@@ -33,7 +34,7 @@ struct GivenPath {
   double inverse_r2(const Scene& scene, int k) const {  // of edge k
     if (k + 1 == length() && infinite()) return 1.0;
     const Vec3d& to = k + 1 == length() ? end.p : x(k + 1).at.p;
-    if (k == 0) return 1.0 / scene.camera().spread(coordinate, to);
+    if (k == 0) return 1.0 / scene.camera().spread(coordinate, to, lens);
     return 1.0 / (to - x(k).at.p).squaredNorm();
   }
   /// With v_k at the light end.
@@ -53,11 +54,14 @@ std::optional<GivenPath> draw_path(const TestScene& test, Rng& rng) {
   const Scene& scene = test.scene;
   const EmissionGuide unguided(scene);
   const SubpathTracer tracer(scene, unguided, MisHeuristic::Balance);
-  const Vec3d v = scene.camera().direction(rng.uniform2());
+  const Vec2d film = rng.uniform2();
+  const Vec3d lens = sample_lens(scene.camera(), rng);
+  const Vec3d v = scene.camera().direction(film, lens);
   Subpath subpath;
-  const auto escape = tracer.trace(Walk::FromSensor, tracer.leave_sensor(v), RayFollower(scene, v),
-                                   test.max_depth, rng, subpath);
+  const auto escape = tracer.trace(Walk::FromSensor, tracer.leave_sensor(v, lens),
+                                   RayFollower(scene, v, lens), test.max_depth, rng, subpath);
   GivenPath path;
+  path.lens = lens;
   path.coordinate = v;
   const int last = static_cast<int>(rng.uniform() * (subpath.size() + 1));
   if (last < subpath.size()) {
@@ -99,7 +103,7 @@ std::optional<GivenPath> draw_path(const TestScene& test, Rng& rng) {
 /// Vertices x_1, x_2, .. as walked from the sensor, up to the light end.
 std::vector<Departure> walk_from_sensor(const SubpathTracer& tracer, const GivenPath& path,
                                         std::vector<SubpathVertex>& vertices) {
-  std::vector<Departure> departures{tracer.leave_sensor(path.coordinate)};
+  std::vector<Departure> departures{tracer.leave_sensor(path.coordinate, path.lens)};
   for (int k = 1; k < path.length(); ++k) {
     vertices.push_back(tracer.arrive(departures.back(), path.x(k)));
     departures.push_back(

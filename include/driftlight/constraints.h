@@ -20,9 +20,15 @@ class ConstraintVisitor : public WalkVisitor<T> {
 
   explicit ConstraintVisitor(Sink& sink) : sink_(sink) {}
 
+  /// Position on the lens, of standard deviation 1/2 of its radius along each axis.
+  void lens(const Camera& camera, const Vec3<T>& p) {
+    add(scaled(Vec3<T>(p - constant<T>(camera.origin)), constant<T>(1.0 / camera.lens_radius)),
+        constant<S>(4.0));
+  }
+
   /// Film position: uniform on the film, half side / sqrt(3); 1 / sqrt(12) in film coordinates.
-  void sensor(const Camera& camera, const Vec3<T>& v) {
-    const Vec2<T> film = camera.film_position(v);
+  void sensor(const Camera& camera, const Vec3<T>& v, const Vec3<T>& lens) {
+    const Vec2<T> film = camera.film_position(v, lens);
     const S precision = constant<S>(12.0);
     sink_.add(film.x(), precision);
     sink_.add(film.y(), precision);

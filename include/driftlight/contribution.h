@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// The contribution f of a light path (DESIGN 1.1), written once for every Scalar.
 ///
-/// In the measure of the path's coordinates (solid angle for free directions, area for an emitter
-/// point),
+/// In the measure of the path's coordinates (solid angle for free directions, area for points on an
+/// emitter and on a lens),
 ///   f = W(v_0) prod_free f_s(x_k; -v_{k-1}, v_k) |n_k . v_k|
 ///              prod_delta {R_k or (1 - R_k) eta^-2}  L_end,
 ///   L_end = L_e                      free direction that hits an emitter or the environment
@@ -29,6 +29,8 @@
 /// w_i toward the sensor and w_o toward the light as everywhere. The eta^-2 of transmission is
 /// gone: it is that of n^2 d omega. W(v_0) of t = 1 is at the direction of the joining edge.
 ///
+/// A lens of radius R adds 1 / (pi R^2).
+///
 /// Factors with a large range enter as a sum of logarithms, colours (of order 1) as a product.
 #pragma once
 
@@ -40,7 +42,12 @@ namespace driftlight {
 template <Scalar T>
 class ContributionVisitor : public WalkVisitor<T> {
  public:
-  void sensor(const Camera& camera, const Vec3<T>& v) { log_scale_ += camera.log_importance(v); }
+  void lens(const Camera& camera, const Vec3<T>&) {
+    log_scale_ = log_scale_ + std::log(camera.lens_density());
+  }
+  void sensor(const Camera& camera, const Vec3<T>& v, const Vec3<T>&) {
+    log_scale_ += camera.log_importance(v);
+  }
   void scatter(const ScatterEvent<T>& e) { multiply(eval(e.bsdf, e.surface(), e.wi, e.wo)); }
   void connect(const ScatterEvent<T>& e) { scatter(e); }
   void delta(const ScatterEvent<T>& e) {

@@ -89,7 +89,7 @@ class RiccatiFactor {
   static Eigen::Array4d next_state(const Step& step, int k, const Eigen::Array4d& s, double u0,
                                    double u1);
 
-  std::array<Step, kMaxPathLength + 2> steps_;
+  std::array<Step, kMaxStages> steps_;
   int step_count_ = 0;
   int dimension_ = 0;
   double log_det_ = 0;

@@ -17,6 +17,7 @@
 /// exchanged, and there is the factor (H24) besides. The emitter is at the end of that sweep, with
 /// x_bar the derivative by the point y and v_bar that by the emitted direction v:
 ///   area   both have their share of (H25)
+/// What x_bar is in the end is the derivative by the point on a lens.
 /// A textured emitter's radiance has the partials f_u, f_v by its uv (H37); where it is hit
 ///   x_bar = (I - v n^T / n.v) (duv/dx)^T uv_bar,   v_bar = t x_bar,
 /// and as a block the point y has them in its y_bar.
@@ -60,8 +61,8 @@ class GradientSweep : RecordedPath<Rules> {
     if (topology_.has_light_side()) {
       const Vec3d e_bar = joining_edge();
       light_side(e_bar, block);
-      if (path_.count == 0) return;
       x_bar = -e_bar;
+      if (path_.count == 0) return store_lens(x_bar);
     }
     for (int k = path_.count - 1; k >= 0; --k) {
       const Vertex& x = vertex(k);
@@ -81,7 +82,8 @@ class GradientSweep : RecordedPath<Rules> {
     }
     const Camera& camera = scene_.camera();
     if (camera.is_orthographic()) v_bar = Rules::parallel_camera(camera, path_.v0, x_bar);
-    store(0, v_bar + Rules::camera(camera, path_.v0));
+    store(topology_.lens_block_count(), v_bar + Rules::camera(camera, path_.v0));
+    store_lens(x_bar);
   }
 
  private:
@@ -90,6 +92,10 @@ class GradientSweep : RecordedPath<Rules> {
   void store(int block, const Vec3d& bar) {
     result_.gradient[2 * block] = -chart_.block(block).t.dot(bar);
     result_.gradient[2 * block + 1] = -chart_.block(block).b.dot(bar);
+  }
+
+  void store_lens(const Vec3d& x_bar) {
+    if (topology_.has_lens) store(0, x_bar);
   }
 
   Vec3d environment_adjoint() const {

@@ -54,7 +54,8 @@ struct Recorder : WalkVisitor<double> {
     return k == 0 ? sensor_origin : vertices[static_cast<std::size_t>(k - 1)].p;
   }
 
-  void sensor(const Camera&, const Vec3d& v) { v0 = departure = v; }
+  void lens(const Camera&, const Vec3d& p) { sensor_origin = p; }
+  void sensor(const Camera&, const Vec3d& v, const Vec3d&) { v0 = departure = v; }
   void depart_parallel(const Ray<double>& ray) {
     sensor_origin = ray.origin;
     departure = ray.direction;

@@ -8,6 +8,8 @@
 ///   Phong   r = w_o - mirror: dr = dw_o - (2 c_i dn + 2 n dc_i - dw_i)                    (H21)
 ///   film    x = (right.v) / (2 a f), f = forward.v:
 ///           dx = (right - (right.v) forward / f) / (2 a f) . dv                           (H22)
+///   lens    from the point l of a lens in focus at F also right.(l - o) / (2 a F):
+///           dx += right / (2 a F) . dl;  its own residual is (l - o) / R                  (H42)
 ///   spot    r = w_o: with its share of (H18)
 ///   coating r of what is below, by w' = w / eta + (c' - c / eta) n with c' of (H39):
 ///           dw' = dw / eta + n (c / (eta^2 c') - 1 / eta) dc + (c' - c / eta) dn         (H40)
@@ -121,9 +123,18 @@ class StageSweep : RecordedPath<Rules> {
     ray_.xi_b = plane.b;
   }
 
+  /// (H42): the point on the lens, if there is one; its differential from here on.
+  Columns begin_at_lens() {
+    if (!topology_.has_lens) return Columns::zero();
+    add(2.0 / (3.0 * scene_.camera().lens_radius), block_columns());
+    return begin_at_point();
+  }
+
   void begin_at_sensor() {
-    film(block_columns());
+    const Columns lens = begin_at_lens();
+    film(block_columns(), lens);
     const Camera& camera = scene_.camera();
+    if (topology_.has_lens) return depart_freely(camera.forward, lens);
     if (!camera.is_orthographic()) {
       close(Stage::Kind::Free, true);
       take_direction();
@@ -142,6 +153,25 @@ class StageSweep : RecordedPath<Rules> {
     at.dwi.set(columns_.omega + 1, -ray_.omega_b);
     at.dn = normal(x.surface, at.dx);
     return at;
+  }
+
+  /// The next block is a point, xi of the next stage; its differential there.
+  Columns begin_at_point() {
+    close(Stage::Kind::Point, true);
+    ray_.xi_t = chart_.block(block_).t;
+    ray_.xi_b = chart_.block(block_).b;
+    ++block_;
+    Columns d = Columns::zero();
+    d.set(columns_.xi, ray_.xi_t);
+    d.set(columns_.xi + 1, ray_.xi_b);
+    return d;
+  }
+  /// The next block is the direction in which the ray leaves a point with this differential.
+  void depart_freely(const Vec3d& normal, const Columns& d) {
+    set_plane(normal);
+    take_direction();
+    Stage& stage = close(Stage::Kind::Free, true);
+    stage.position = map(d, ray_.xi_t, ray_.xi_b);
   }
 
   /// Scattering, and the ray that goes on.
@@ -171,6 +201,8 @@ class StageSweep : RecordedPath<Rules> {
       begin_at_sensor();
       for (int k = 0; k + 1 < path_.count; ++k) pass(k);
       x = arrive(vertex(path_.count - 1));
+    } else {
+      x.dx = begin_at_lens();
     }
     result_.sensor_stages = result_.stage_count;
     columns_ = kLightColumns;
@@ -199,13 +231,7 @@ class StageSweep : RecordedPath<Rules> {
         position(this->emitter_shape(), dy);
       else
         add(2.0 / (3.0 * scene_.radius()), dy);
-      close(Stage::Kind::Point, true);
-      ray_.xi_t = chart_.block(block_).t;
-      ray_.xi_b = chart_.block(block_).b;
-      ++block_;
-      dy = Columns::zero();
-      dy.set(columns_.xi, ray_.xi_t);
-      dy.set(columns_.xi + 1, ray_.xi_b);
+      dy = begin_at_point();
     }
     if (topology_.end == PathEnd::DirectionalEmission) return;
     const Vec3d& v = path_.emitted;
@@ -218,10 +244,7 @@ class StageSweep : RecordedPath<Rules> {
     } else if (const SpotEmitter* light = this->spot()) {
       add(1.0 / (3.0 * light->width()), dv);
     }
-    set_plane(normal);
-    take_direction();
-    Stage& stage = close(Stage::Kind::Free, true);
-    stage.position = map(dy, ray_.xi_t, ray_.xi_b);
+    depart_freely(normal, dy);
   }
 
   /// Both ends of the joining edge, whose columns are those of both sides: (H18).
@@ -232,7 +255,8 @@ class StageSweep : RecordedPath<Rules> {
       const Vec3d& v = path_.v0;
       const Vec3d& forward = scene_.camera().forward;
       const Columns across = y.dx - outer(forward, dot(forward, y.dx));
-      film(scene_.camera().cosine(v) / scene_.camera().scale * (across - outer(v, dot(v, across))));
+      film(scene_.camera().cosine(v) / scene_.camera().scale * (across - outer(v, dot(v, across))),
+           Columns::zero());
       position(*at.shape, y.dx);
       residuals(at, y.dwi, Columns::zero(), y.dn);
       return;
@@ -246,7 +270,7 @@ class StageSweep : RecordedPath<Rules> {
       position(*from.shape, x.dx);
       residuals(from, x.dwi, dw, x.dn);
     } else {
-      film(dw);
+      film(dw, x.dx);
     }
     position(*at.shape, y.dx);
     residuals(at, y.dwi, -1.0 * dw, y.dn);
@@ -300,16 +324,17 @@ class StageSweep : RecordedPath<Rules> {
     return map.normal_factor * dn + outer(x.n_s, map.n_factor * d_cos) + map.wi_factor * dwi;
   }
 
-  /// (H22)
-  void film(const Columns& dv) {
+  /// (H22), (H42)
+  void film(const Columns& dv, const Columns& lens) {
     const Camera& camera = scene_.camera();
     const Vec3d& v = path_.v0;
     const double f = camera.cosine(v);
     const double factor = std::sqrt(12.0) / 3.0;
     const Vec3d x = camera.right - camera.right.dot(v) / f * camera.forward;
     const Vec3d y = camera.up - camera.up.dot(v) / f * camera.forward;
-    add(factor * 0.5 / (camera.half_width * f) * dot(x, dv));
-    add(-factor * 0.5 / (camera.half_height * f) * dot(y, dv));
+    const double shift = f / camera.focus_depth;
+    add(factor * 0.5 / (camera.half_width * f) * (dot(x, dv) + shift * dot(camera.right, lens)));
+    add(-factor * 0.5 / (camera.half_height * f) * (dot(y, dv) + shift * dot(camera.up, lens)));
   }
 
   void position(const Shape& shape, const Columns& dx) {

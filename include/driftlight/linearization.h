@@ -39,27 +39,32 @@ struct LocalColumns {
 inline constexpr LocalColumns kSensorColumns{.xi = 0, .omega = 2, .u = 4};
 inline constexpr LocalColumns kLightColumns{.xi = 4, .omega = 6, .u = 0};
 
-/// Most residuals of a path: two of the film, three of each position, three of each lobe of each
-/// scattering, three of the environment or of a spot, two of the aperture of each segment.
+/// Most residuals of a path: three of the lens, two of the film, three of each position, three of
+/// each lobe of each scattering, three of the environment or of a spot, two of the aperture of each
+/// segment.
 inline constexpr int kMaxResiduals =
-    2 + (3 + 3 * kMaxLobes) * kMaxPathLength + 3 + 2 * kMaxPathLength;
+    5 + (3 + 3 * kMaxLobes) * kMaxPathLength + 3 + 2 * kMaxPathLength;
+/// Most stages: one for each edge, another for the last vertex, and the points on a lens and on an
+/// emitter.
+inline constexpr int kMaxStages = kMaxPathLength + 3;
 
-/// The sensor (stage 0), a scattering vertex, or the end of a path that hits an emitter or leaves
-/// the scene; of the light side the emitter (a point there, then emission) or a scattering vertex.
+/// The sensor (stage 0; a point on its lens comes before), a scattering vertex, or the end of a
+/// path that hits an emitter or leaves the scene; of the light side the emitter (a point there,
+/// then emission) or a scattering vertex.
 struct Stage {
   enum class Kind : std::uint8_t {
     Free,      ///< takes a block of coordinates, and is followed by another stage
     Delta,     ///< no block of its own; followed by another stage
     Terminal,  ///< the last one, with a block (an emitter point) or without
-    Point,     ///< the first of a light side or at an orthographic sensor: its block is xi of the
-               ///< next
+    Point,     ///< the first of a light side, on a lens or at an orthographic sensor: its block is
+               ///< xi of the next
   };
   using Map = Eigen::Matrix<double, 2, 4, Eigen::RowMajor>;
 
   Kind kind = Kind::Terminal;
   bool has_block = false;
   int rows_end = 0;  ///< one past the last residual row of this stage; they follow each other
-  Map position;      ///< A; not set for stage 0, points and terminal stages
+  Map position;      ///< A; not set for the first, points and terminal stages
   Map direction;     ///< D; delta stages only
 };
 
@@ -71,7 +76,7 @@ struct Linearization {
   int block_count = 0;
   bool has_light_side = false;
   int sensor_stages = 0;  ///< with a light side: those before it
-  std::array<Stage, kMaxPathLength + 2> stages;
+  std::array<Stage, kMaxStages> stages;
   /// Rows sqrt(w)/3 dr / d(xi, omega, u) of all residuals r with precision w, in the order of
   /// ConstraintVisitor; behind them in each stage those of apertures (aperture.h).
   Eigen::Array<double, kMaxResiduals, kLocalWidth, Eigen::RowMajor> rows;

@@ -13,8 +13,11 @@ namespace driftlight {
 
 /// Longest path, in edges. Bounds all per-path storage, so that nothing allocates.
 inline constexpr int kMaxPathLength = 16;
-/// Most coordinates of a path: two for each free direction or emitter point.
-inline constexpr int kMaxDimension = 2 * kMaxPathLength;
+/// Most blocks of coordinates: one for each edge, and a point on the lens.
+inline constexpr int kMaxBlocks = kMaxPathLength + 1;
+/// Bounds the coordinates of a path, two for each block: a multiple of 8, so that passes of Jets
+/// fit in.
+inline constexpr int kMaxDimension = (2 * kMaxBlocks + 7) / 8 * 8;
 
 /// What the coordinates of paths are (DESIGN 1.2).
 enum class PhaseSpace : std::uint8_t {
@@ -61,6 +64,7 @@ struct PathTopology {
   std::uint8_t scatter_count = 0;
   std::uint8_t light_count = 0;
   std::uint8_t block_count = 0;
+  bool has_lens = false;  ///< the first block is a point on the camera's lens
 
   /// Edges from the sensor to the emitter.
   int length() const { return scatter_count + 1; }
@@ -69,17 +73,18 @@ struct PathTopology {
   bool has_light_side() const { return light_count > 0; }
   /// Scattering vertices on the sensor's side.
   int camera_count() const { return scatter_count - light_count; }
-  /// Blocks on the sensor's side, before those of the light side: free directions but not that of
-  /// the joining edge.
+  int lens_block_count() const { return has_lens ? 1 : 0; }
+  /// Blocks on the sensor's side, before those of the light side: the point on the lens and free
+  /// directions, but not that of the joining edge.
   int camera_block_count() const {
     if (!has_light_side()) return block_count;
-    int count = camera_count() > 0 ? 1 : 0;
+    int count = lens_block_count() + (camera_count() > 0 ? 1 : 0);
     for (int k = 0; k + 1 < camera_count(); ++k)
       if (!vertices[static_cast<std::size_t>(k)].delta) ++count;
     return count;
   }
-  /// The block that is a point, on an emitter or on the disk of PathEnd::DirectionalEmission; -1 if
-  /// all are directions.
+  /// The block that is a point on an emitter or on the disk of PathEnd::DirectionalEmission; -1 if
+  /// there is none.
   int point_block() const {
     if (end == PathEnd::AreaConnection) return block_count - 1;
     if (end == PathEnd::AreaEmission || end == PathEnd::DirectionalEmission)
@@ -100,7 +105,8 @@ struct PathTopology {
 
 /// The coordinates of a path, one block of two dimensions after the other: the unit directions v_k
 /// that are free, in order from the sensor, v_0 the coordinate of the first ray (sensor.h); with
-/// PathEnd::AreaConnection the last block is the position of the emitter point instead.
+/// PathEnd::AreaConnection the last block is the position of the emitter point instead. Before them
+/// all, of a camera with a lens, the point on it that the path begins at.
 ///
 /// With a light side: the free directions on the sensor's side but that of the joining edge; then
 /// those of the light side, all along the light:
@@ -112,7 +118,7 @@ struct PathTopology {
 /// and the free directions at its vertices, in order from the emitter, but that of the joining
 /// edge.
 struct PathCoordinates {
-  std::array<Vec3d, kMaxPathLength> blocks;
+  std::array<Vec3d, kMaxBlocks> blocks;
 
   const Vec3d& operator()(int block) const { return blocks[static_cast<std::size_t>(block)]; }
   Vec3d& operator()(int block) { return blocks[static_cast<std::size_t>(block)]; }

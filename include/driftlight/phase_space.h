@@ -15,6 +15,12 @@ using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxDimension, 1>;
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, kMaxDimension,
                              kMaxDimension>;
 
+/// The point on the lens that a path begins at; the origin of a camera without one.
+inline const Vec3d& lens_point(const Scene& scene, const PathTopology& topology,
+                               const PathCoordinates& coordinates) {
+  return topology.has_lens ? coordinates(0) : scene.camera().origin;
+}
+
 /// What became of a trace.
 enum class TraceStatus : std::uint8_t {
   Ok,
@@ -48,7 +54,8 @@ TraceStatus trace(const Scene& scene, const PathTopology& pattern,
 
 /// Tangent coordinates delta about a point of the phase space: for each block an orthogonal basis
 /// of the tangent plane, of unit length for directions and of the length of the emitter's radius
-/// for emitter points, so that a unit step is of the size of the emitter.
+/// for emitter points, so that a unit step is of the size of the emitter; likewise for points on a
+/// lens.
 class Chart {
  public:
   /// A plane or a sphere that a block lives on.
@@ -98,7 +105,7 @@ class Chart {
   std::optional<Inverse> inverse(const PathCoordinates& to) const;
 
  private:
-  std::array<Block, kMaxPathLength> blocks_;
+  std::array<Block, kMaxBlocks> blocks_;
   int count_ = 0;
 };
 

@@ -77,7 +77,7 @@ class TwoSidedFactor {
   /// The adjoint of `solve` along a side: of the state behind it; returns that of r.
   State run_back(const Side& side, State lambda, const Vector& x, Vector& y) const;
 
-  std::array<Step, kMaxPathLength + 2> steps_;
+  std::array<Step, kMaxStages> steps_;
   int sensor_steps_ = 0;
   int step_count_ = 0;
   int sensor_blocks_ = 0;

@@ -26,8 +26,12 @@ struct ScatterEvent {
 /// Does nothing; visitors derive from it and hide what they want to see.
 template <Scalar T>
 struct WalkVisitor {
-  /// The coordinate of the first ray (sensor.h): its direction, from a pinhole.
-  void sensor(const Camera&, const Vec3<T>& /*v*/) {}
+  /// The point on the lens that the path begins at, before `leave_point` there; no event without a
+  /// lens.
+  void lens(const Camera&, const Vec3<T>& /*p*/) {}
+  /// The coordinate of the first ray (sensor.h), from this point of the lens: its direction, but
+  /// for an orthographic camera.
+  void sensor(const Camera&, const Vec3<T>& /*v*/, const Vec3<T>& /*lens*/) {}
   /// A vertex on a surface, before the scattering there is visited; also the last one of
   /// PathEnd::Hit and PathEnd::AreaConnection.
   void position(const Shape&, const Vec3<T>& /*p*/) {}
@@ -62,7 +66,8 @@ struct WalkVisitor {
 
   /// The light side begins.
   void light_side() {}
-  /// A point that light leaves from, for a visitor that changes its derivatives (never its value).
+  /// A point that the light, or the ray from a lens, leaves from, for a visitor that changes its
+  /// derivatives (never its value).
   void leave_point(Vec3<T>& /*y*/) {}
   /// Emission along v, `normal` that of the emitter at y.
   void area_emission(const AreaEmitter&, const Vec3<T>& /*normal*/, const Vec3<T>& /*v*/) {}
@@ -163,11 +168,23 @@ Vec2<T> uv_at_end(const Blocks& blocks, const Shape& shape, const Vec3<T>& y) {
     return emitter_uv(shape, y);
 }
 
-/// The ray that leaves the sensor, v its coordinate.
+/// The point on the lens that the path begins at, its first block; of a camera without one the
+/// origin.
+template <Scalar T, class Blocks, class Visitor>
+Vec3<T> begin_at_lens(const Camera& camera, const PathTopology& topology, const Blocks& blocks,
+                      Visitor& visitor) {
+  if (!topology.has_lens) return constant<T>(camera.origin);
+  Vec3<T> p = blocks(0);
+  visitor.lens(camera, p);
+  visitor.leave_point(p);
+  return p;
+}
+
+/// The ray that leaves the sensor at this point of the lens, v its coordinate.
 template <Scalar T, class Visitor>
-Ray<T> leave_sensor(const Camera& camera, const Vec3<T>& v, Visitor& visitor) {
-  visitor.sensor(camera, v);
-  Ray<T> ray = camera.ray(v);
+Ray<T> leave_sensor(const Camera& camera, const Vec3<T>& v, const Vec3<T>& lens, Visitor& visitor) {
+  visitor.sensor(camera, v, lens);
+  Ray<T> ray = camera.ray(v, lens);
   if (camera.is_orthographic())
     visitor.depart_parallel(ray);
   else
@@ -184,11 +201,13 @@ class TwoSidedWalk {
       : scene_(scene), topology_(topology), blocks_(blocks), visitor_(visitor) {}
 
   void run() {
+    const Vec3<T> lens = begin_at_lens<T>(scene_.camera(), topology_, blocks_, visitor_);
+    next_block_ = topology_.lens_block_count();
     if (topology_.camera_count() == 0) {
       const WalkVertex<T> y = light_side();
-      return join(scene_.camera(), y);
+      return join(scene_.camera(), lens, y);
     }
-    const WalkVertex<T> x = camera_side();
+    const WalkVertex<T> x = camera_side(lens);
     const WalkVertex<T> y = light_side();
     join(x, y);
   }
@@ -196,8 +215,8 @@ class TwoSidedWalk {
  private:
   const PathVertex& vertex(int k) const { return topology_.vertices[static_cast<std::size_t>(k)]; }
 
-  WalkVertex<T> camera_side() {
-    Ray<T> ray = leave_sensor<T>(scene_.camera(), blocks_(next_block_++), visitor_);
+  WalkVertex<T> camera_side(const Vec3<T>& lens) {
+    Ray<T> ray = leave_sensor<T>(scene_.camera(), blocks_(next_block_++), lens, visitor_);
     const int last = topology_.camera_count() - 1;
     for (int k = 0; k < last; ++k) {
       const WalkVertex<T> x = arrive(scene_, vertex(k), ray);
@@ -282,11 +301,11 @@ class TwoSidedWalk {
     visitor_.connect(x.event(x.w, edge_));
     join_light(y, r2);
   }
-  void join(const Camera& camera, const WalkVertex<T>& y) {
-    const Vec3<T> v = camera.coordinate(y.at.p);
-    visitor_.sensor(camera, v);
-    edge_ = camera.ray(v).direction;
-    join_light(y, camera.spread(v, y.at.p));
+  void join(const Camera& camera, const Vec3<T>& lens, const WalkVertex<T>& y) {
+    const Vec3<T> v = camera.coordinate(y.at.p, lens);
+    visitor_.sensor(camera, v, lens);
+    edge_ = camera.ray(v, lens).direction;
+    join_light(y, camera.spread(v, y.at.p, lens));
   }
   /// Sets the unit direction of the joining edge; its squared length.
   T aim(const Vec3<T>& from, const Vec3<T>& to) {
@@ -325,8 +344,9 @@ void walk(const Scene& scene, const PathTopology& topology, const Blocks& blocks
   if (topology.has_light_side())
     return TwoSidedWalk<T, Blocks, Visitor>(scene, topology, blocks, visitor).run();
   using std::sqrt;
-  Ray<T> ray = leave_sensor<T>(scene.camera(), blocks(0), visitor);
-  int next_block = 1;
+  const Vec3<T> lens = begin_at_lens<T>(scene.camera(), topology, blocks, visitor);
+  int next_block = topology.lens_block_count();
+  Ray<T> ray = leave_sensor<T>(scene.camera(), blocks(next_block++), lens, visitor);
   for (int k = 0; k < topology.scatter_count; ++k) {
     const WalkVertex<T> x = arrive(scene, topology.vertices[static_cast<std::size_t>(k)], ray);
     const Interaction<T>& at = x.at;

@@ -87,8 +87,12 @@ std::string describe_camera(const Camera& camera) {
                        2.0 * camera.half_width * camera.scale, camera.origin.x(), camera.origin.y(),
                        camera.origin.z());
   const double degrees = 360.0 * kInvPi * std::atan(camera.half_width);
-  return fmt::format("perspective, {:.4g} degrees across, at ({:.4g}, {:.4g}, {:.4g})", degrees,
-                     camera.origin.x(), camera.origin.y(), camera.origin.z());
+  std::string text = fmt::format("perspective, {:.4g} degrees across, at ({:.4g}, {:.4g}, {:.4g})",
+                                 degrees, camera.origin.x(), camera.origin.y(), camera.origin.z());
+  if (camera.has_lens())
+    text += fmt::format(", lens of radius {:.4g} in focus at depth {:.4g}", camera.lens_radius,
+                        camera.focus_depth);
+  return text;
 }
 
 std::string describe_bounds(const Scene& scene) {

@@ -244,6 +244,18 @@ Camera read_perspective(Properties& sensor, const FilmSize& film) {
   return camera;
 }
 
+/// A perspective sensor whose focus is at infinity, or where it ends to see, if nothing else is
+/// said.
+Camera read_thin_lens(Properties& sensor, const FilmSize& film) {
+  Camera camera = read_perspective(sensor, film);
+  if (!sensor.has("apertureRadius"))
+    sensor.element().fail(sensor.description() + " needs an " +
+                          spelling("apertureRadius", sensor.dialect()));
+  camera.lens_radius = sensor.non_negative("apertureRadius", 0.0);
+  camera.focus_depth = sensor.positive("focusDistance", camera.far_clip);
+  return camera;
+}
+
 /// The film is [-1, 1] wide in the sensor's own frame, and as high as its aspect wants.
 Camera read_orthographic(Properties& sensor, const FilmSize& film) {
   Camera camera;
@@ -264,8 +276,10 @@ Camera read_orthographic(Properties& sensor, const FilmSize& film) {
 }
 
 using SensorReader = Camera (*)(Properties&, const FilmSize&);
-constexpr std::array<std::pair<std::string_view, SensorReader>, 2> kSensors{
-    {{"perspective", &read_perspective}, {"orthographic", &read_orthographic}}};
+constexpr std::array<std::pair<std::string_view, SensorReader>, 3> kSensors{
+    {{"perspective", &read_perspective},
+     {"thinlens", &read_thin_lens},
+     {"orthographic", &read_orthographic}}};
 
 }  // namespace
 
@@ -276,7 +290,7 @@ Camera read_sensor(const Element& element, LoadContext& context) {
   Camera camera = read(properties, film);
   camera.filter = film.filter;
   crop(camera, film);
-  // These have no focus, and nothing here moves.
+  // The others have no focus, and nothing here moves.
   properties.ignore({"focusDistance", "shutterOpen", "shutterClose"});
   for (const Element& sampler : properties.nested({"sampler"})) note_sampler(sampler, context);
   properties.finish();

@@ -409,6 +409,39 @@ Scene plan(bool with_caustics) {
   return make->build();
 }
 
+Scene lens(bool with_caustics) {
+  Workshop make;
+  const auto plain = make.one_sided(Diffuse{gray(0.7)});
+  make->add_shape(quad({-3, 0, 3}, {6, 0, 0}, {0, 0, -6}),
+                  make.one_sided(Phong{textured(8, 0.2, 0.6), gray(0.3), 15}));
+  make->add_shape(quad({-3, 0, -2}, {6, 0, 0}, {0, 3, 0}), plain);
+  make->add_shape(sphere_at({-0.7, 0.45, 1.4}, 0.45),
+                  make.one_sided(RoughConductor{ggx(0.25), kGoldEta, kGoldK, gray(1.0)}));
+  make->add_shape(round_mesh({0.5, 0.5, 0.0}, 0.5, 8), plain);
+  if (with_caustics) {
+    make->add_shape(sphere_at({0.3, 0.3, 2.0}, 0.3),
+                    make.one_sided(Dielectric{kGlass, gray(1.0), gray(1.0)}));
+    make->add_shape(sphere_at({1.3, 0.4, 0.8}, 0.4),
+                    make.one_sided(RoughDielectric{beckmann(0.25), kGlass, gray(1.0), gray(1.0)}));
+    make->add_shape(quad({-1.8, 0.1, 0.6}, {0.3, 0, -0.8}, {0, 1.2, 0}),
+                    make.one_sided(Conductor{kGoldEta, kGoldK, gray(1.0)}));
+    make->add_emitter(SpotEmitter({0.3, 3.2, 2.0}, {-0.1, -3.0, -1.8}, {30, 25, 20}, 0.6, 0.2));
+    make->add_emitter(DirectionalEmitter{Vec3d(0.5, -1.0, -0.8).normalized(), {0.3, 0.4, 0.5}});
+  }
+  const auto black = make.one_sided(Diffuse{gray(0.0)});
+  make->add_shape(quad({-0.6, 2.7, 0.0}, {1.2, 0, 0}, {0, 0, 1.2}), black, Rgbd{4, 4, 4});
+  make->add_shape(round_mesh({-1.3, 1.5, -0.8}, 0.3, 4, false), black, Rgbd{4, 5, 6});
+  make->set_environment(ConstantEnvironment{{0.2, 0.25, 0.3}});
+  Camera camera = look_at({0, 1.4, 3.8}, {0, 0.7, 0}, 0.5);
+  camera.lens_radius = 0.2;
+  camera.focus_depth = 2.6;
+  camera.half_height = 0.375;
+  camera.film_width = 32;
+  camera.film_height = 24;
+  make->set_camera(camera);
+  return make->build();
+}
+
 const std::vector<TestScene>& test_scenes() {
   static const std::vector<TestScene> scenes = [] {
     std::vector<TestScene> result;
@@ -419,6 +452,7 @@ const std::vector<TestScene>& test_scenes() {
     result.push_back({"stage", stage(), 6});
     result.push_back({"coated", coated(true), 6});
     result.push_back({"plan", plan(true), 6});
+    result.push_back({"lens", lens(true), 6});
     return result;
   }();
   return scenes;

@@ -26,12 +26,15 @@ struct TestScene {
 ///   coated     smooth and rough plastic, layers, panes, masks and what only lets pass
 ///   plan       diffuse, glossy and smooth things and blends of them under area emitters, a spot
 ///              and parallel light, as an orthographic camera sees them; bump and normal maps
+///   lens       diffuse, glossy and smooth things under area emitters, a spot, parallel light and a
+///              constant environment, as a lens sees them that is in focus among them
 const std::vector<TestScene>& test_scenes();
 
 /// With films of 32 x 24 pixels; path tracing finds all light of the first without the point
-/// emitter, and of the second without glass and emitters that cannot be hit.
+/// emitter, and of the others without glass and emitters that cannot be hit.
 Scene coated(bool with_point);
 Scene plan(bool with_caustics);
+Scene lens(bool with_caustics);
 
 /// Paths that carry light, drawn from a scene by its PathSampler.
 std::vector<PathSampler::Sample> light_paths(const TestScene& scene, int count, std::uint64_t seed);
