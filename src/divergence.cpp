@@ -10,17 +10,17 @@
 namespace driftlight {
 
 Vector divergence(const Scene& scene, const PathTopology& topology, const Chart& chart,
-                  DerivativeMethod method, const Apertures& apertures) {
+                  DerivativeMethod method, const Apertures& apertures, double floor) {
   constexpr DerivativeRequest kConstraints{.gradient = false, .constraints = true};
   const int d = chart.dimension();
   Linearization path;
+  path.floor = floor;
   linearize(scene, topology, chart, method, kConstraints, path);
   constrain(scene, topology, chart, apertures, path);
   Factor factor;
   if (factorise(path, factor) != FactorStatus::Ok)
     return Vector::Constant(d, std::numeric_limits<double>::quiet_NaN());
-  const Vector diagonal =
-      jacobian(path).colwise().squaredNorm().transpose().array() + kConstraintFloor;
+  const Vector diagonal = jacobian(path).colwise().squaredNorm().transpose().array() + floor;
   const auto solve = [&](const Vector& x) {
     return std::visit([&](const auto& f) { return Vector(f.solve(f.solve_transposed(x))); },
                       factor);

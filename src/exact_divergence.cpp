@@ -95,7 +95,8 @@ class HessianSink {
 
 }  // namespace
 
-Vector exact_divergence(const Scene& scene, const PathTopology& topology, const Chart& chart) {
+Vector exact_divergence(const Scene& scene, const PathTopology& topology, const Chart& chart,
+                        double floor) {
   const int d = chart.dimension();
   std::vector<Term> terms;
   terms.reserve(kMaxResiduals);
@@ -103,7 +104,7 @@ Vector exact_divergence(const Scene& scene, const PathTopology& topology, const 
     GradientSink sink(terms, first);
     walk_block(scene, topology, chart, first, first, sink);
   }
-  Matrix q = kConstraintFloor * Matrix::Identity(d, d);
+  Matrix q = floor * Matrix::Identity(d, d);
   for (const Term& term : terms)
     q += term.precision / 9.0 * term.gradient.head(d) * term.gradient.head(d).transpose();
   const Eigen::LLT<Matrix> cholesky(q);

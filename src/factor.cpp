@@ -112,9 +112,9 @@ RiccatiFactor::RiccatiFactor(const Linearization& path)
       cost = m.ss;
       continue;
     }
-    double a = m.u0[4] + kConstraintFloor;
+    double a = m.u0[4] + path.floor;
     double b = m.u1[4];
-    double c = m.u1[5] + kConstraintFloor;
+    double c = m.u1[5] + path.floor;
     if (stage.kind != Stage::Kind::Terminal) {
       const int i = stage.kind == Stage::Kind::Point ? 0 : 2;  // u becomes xi or omega
       a += cost(i, i);

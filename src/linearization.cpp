@@ -71,7 +71,7 @@ Jacobian jacobian(const Linearization& path) {
 Matrix constraint_matrix(const Linearization& path) {
   const Jacobian rows = jacobian(path);
   Matrix q = rows.transpose() * rows;
-  q.diagonal().array() += kConstraintFloor;
+  q.diagonal().array() += path.floor;
   return q;
 }
 
@@ -80,7 +80,7 @@ Vector apply_constraints(const Linearization& path, const Vector& x) {
   if (path.has_light_side) {
     const Jacobian rows = jacobian(path);
     const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxResiduals, 1> y = rows * x;
-    return rows.transpose() * y + kConstraintFloor * x;
+    return rows.transpose() * y + path.floor * x;
   }
   Eigen::Array<double, kMaxResiduals, 1> residuals;
   Eigen::Vector4d s = Eigen::Vector4d::Zero();
@@ -104,7 +104,7 @@ Vector apply_constraints(const Linearization& path, const Vector& x) {
     s.tail<2>() = u;
   }
 
-  Vector y = kConstraintFloor * x;
+  Vector y = path.floor * x;
   Eigen::Vector4d lambda = Eigen::Vector4d::Zero();
   for (int k = path.stage_count - 1; k >= 0; --k) {
     const Stage& stage = path.stages[static_cast<std::size_t>(k)];

@@ -59,7 +59,9 @@ void prepare_step(const Scene& scene, const KernelOptions& options, ChainState& 
   state.chart = Chart(scene, state.topology, state.coordinates);
   state.has_step = true;
   state.figures.reset();
+  const double floor = kConstraintFloor / (options.trust * options.trust);
   Linearization path;
+  path.floor = floor;
   linearize(scene, state.topology, state.chart, options.derivatives, request, path);
   Apertures apertures;
   if (options.aperture && request.constraints) {
@@ -70,12 +72,12 @@ void prepare_step(const Scene& scene, const KernelOptions& options, ChainState& 
   if (kind == Diagonal) precision = diagonal_precision(path);
   if (kind == Hessian)
     precision = hessian_precision(scene, state.topology, state.chart,
-                                  Vector::Zero(state.chart.dimension()));
+                                  Vector::Zero(state.chart.dimension()), floor);
   std::optional<Vector> div;
   if (options.drift == Drift::Full && kind != Identity) {
-    div = kind == Constraints
-              ? divergence(scene, state.topology, state.chart, options.derivatives, apertures)
-              : dense_divergence(scene, state.topology, state.chart, kind);
+    div = kind == Constraints ? divergence(scene, state.topology, state.chart, options.derivatives,
+                                           apertures, floor)
+                              : dense_divergence(scene, state.topology, state.chart, kind, floor);
     if (!div->allFinite()) div.reset();
   }
   state.finite =

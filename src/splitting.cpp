@@ -23,6 +23,13 @@ Copies copies(double ratio, Rng& rng) {
   return {ratio > 0.0 ? static_cast<int>(std::floor(ratio + u)) : 0, 1.0};
 }
 
+/// The kernel of particles.
+KernelOptions particle_kernel(const LangevinOptions& options) {
+  KernelOptions kernel = options.kernel;
+  kernel.trust = options.splitting.trust;
+  return kernel;
+}
+
 }  // namespace
 
 bool SplittingPlan::takes(LobeSequence sequence) const {
@@ -66,10 +73,11 @@ struct Splitter::Particles {
         remainder(of_remainder),
         brightness(with_brightness),
         scene(scenes[0]),
-        last(scene, options.kernel, remainder, layers),
+        kernel(particle_kernel(options)),
+        last(scene, kernel, remainder, layers),
         figures(static_cast<std::size_t>(scenes.top()) + 1) {
     for (int k = 1; k <= scenes.top(); ++k)
-      levels.push_back(std::make_unique<Level>(scenes[k], options.kernel));
+      levels.push_back(std::make_unique<Level>(scenes[k], kernel));
   }
 
   Level& level(int k) { return *levels[static_cast<std::size_t>(k - 1)]; }
@@ -159,6 +167,7 @@ struct Splitter::Particles {
   const Remainder& remainder;
   const BrightnessMap& brightness;
   const Scene& scene;
+  KernelOptions kernel;
   std::vector<std::unique_ptr<Level>> levels;  ///< 1 and above
   RemainderChain last;
   std::vector<LevelFigures> figures;

@@ -71,9 +71,9 @@ bool TwoSidedFactor::eliminate(const Linearization& path, int k, bool first,
   }
   // P of the variables that u becomes: xi of a point, else omega.
   const std::size_t u = stage.kind == Stage::Kind::Point ? 0 : 2;
-  double a = cost[u][static_cast<Eigen::Index>(u)] + kConstraintFloor;
+  double a = cost[u][static_cast<Eigen::Index>(u)] + path.floor;
   double b = cost[u + 1][static_cast<Eigen::Index>(u)];
-  double c = cost[u + 1][static_cast<Eigen::Index>(u) + 1] + kConstraintFloor;
+  double c = cost[u + 1][static_cast<Eigen::Index>(u) + 1] + path.floor;
   Row us0 = pe[u];
   Row us1 = pe[u + 1];
   for (std::size_t j = 0; j < 4; ++j) {

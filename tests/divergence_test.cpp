@@ -92,9 +92,13 @@ TEST(Divergence, EqualsNestedJetsInEveryClass) {
       const Chart chart(test.scene, path.topology, path.coordinates);
       PathDerivatives derivatives;
       differentiate(test.scene, path.topology, chart, {false, true}, derivatives);
-      const Vector numeric = divergence(test.scene, path.topology, chart);
-      const Vector exact = exact_divergence(test.scene, path.topology, chart);
-      const Matrix q = derivatives.q.selfadjointView<Eigen::Lower>();
+      // One in eight with a small trust region.
+      const double floor = (errors.size() % 8 == 7 ? 30.0 : 1.0) * kConstraintFloor;
+      const Vector numeric =
+          divergence(test.scene, path.topology, chart, DerivativeMethod::Hand, {}, floor);
+      const Vector exact = exact_divergence(test.scene, path.topology, chart, floor);
+      Matrix q = derivatives.q.selfadjointView<Eigen::Lower>();
+      q.diagonal().array() += floor - kConstraintFloor;
       const Vector difference = numeric - exact;
       errors.push_back(std::sqrt(difference.dot(q * difference) / exact.dot(q * exact)));
       classes.add(classes_of(test.scene, path));

@@ -57,6 +57,7 @@ struct Way {
   SplittingOptions splitting = {};
   bool delayed_rejection = false;
   PreconditionerKind preconditioner = PreconditionerKind::Constraints;
+  double trust = 1;
 };
 
 const std::map<std::string, Way>& ways() {
@@ -71,6 +72,7 @@ const std::map<std::string, Way>& ways() {
       {"diagonal", {.drift = Drift::Full, .preconditioner = PreconditionerKind::Diagonal}},
       {"hessian", {.preconditioner = PreconditionerKind::Hessian}},
       {"both_ends", {.phase_space = PhaseSpace::Bidirectional}},
+      {"trust_region", {.drift = Drift::Full, .trust = 0.1}},
       {"redistribution", {.mode = Mode::Redistribution}},
       {"short_chains",
        {.mode = Mode::Redistribution, .drift = Drift::None, .redistribution = {0.2, 7, 6}}},
@@ -146,6 +148,7 @@ TEST_P(LangevinEqualsPath, TileMeans) {
   options.kernel.drift = way.drift;
   options.kernel.aperture = way.aperture;
   options.kernel.preconditioner = way.preconditioner;
+  options.kernel.trust = way.trust;
   options.large_step_probability = work.large_step_probability;
   options.large_steps = way.large_steps;
   options.direct = way.direct;
@@ -183,9 +186,9 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"limelight", "redistribution_both_ends"}, Case{"sun_pane", "splitting"},
                     Case{"sun_pane", "high_threshold"}, Case{"glass_caustic", "splitting"},
                     Case{"lamp_in_glass", "two_levels"}, Case{"coated", "gradient"},
-                    Case{"ring_caustic", "hessian"}, Case{"limelight", "diagonal"},
-                    Case{"coated", "redistribution_both_ends"}, Case{"plan", "gradient"},
-                    Case{"plan", "both_ends"}, Case{"lens", "both_ends"},
+                    Case{"ring_caustic", "hessian"}, Case{"ring_caustic", "trust_region"},
+                    Case{"limelight", "diagonal"}, Case{"coated", "redistribution_both_ends"},
+                    Case{"plan", "gradient"}, Case{"plan", "both_ends"}, Case{"lens", "both_ends"},
                     Case{"lens", "redistribution"}),
     name_of);
 

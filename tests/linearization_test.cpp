@@ -34,6 +34,10 @@ struct Prepared {
     linearize(scene, path.topology, chart, method, {}, local);
   }
   Matrix q() const { return wide.q.selfadjointView<Eigen::Lower>(); }
+  void set_floor(double floor) {
+    local.floor = floor;
+    wide.q.diagonal().array() += floor - kConstraintFloor;
+  }
 };
 
 class Linearize : public testing::TestWithParam<DerivativeMethod> {};
@@ -93,7 +97,8 @@ TEST_P(Linearize, AppliesQ) {
   Rng rng(24, Stream::Test, 0);
   for (const TestScene& test : test_scenes()) {
     for (const Path& path : light_paths(test, 200, 24)) {
-      const Prepared p(test.scene, path, GetParam());
+      Prepared p(test.scene, path, GetParam());
+      if (rng.uniform() < 0.5) p.set_floor(30.0 * kConstraintFloor);
       Vector x(p.chart.dimension());
       for (double& component : x) component = rng.normal();
       const Vector expected = p.q() * x;
@@ -123,11 +128,14 @@ TEST_P(Linearize, AtADisplacedChart) {
   }
 }
 
-// Law: F^T F = Q, F^-1 and F^-T are its inverses, and log_det is half that of Q.
+// Law: F^T F = Q, F^-1 and F^-T are its inverses, and log_det is half that of Q; whatever the
+// floor.
 TEST_P(Linearize, RiccatiFactorIsARootOfQ) {
+  Rng rng(23, Stream::Test, 0);
   for (const TestScene& test : test_scenes()) {
     for (const Path& path : light_paths(test, 500, 23)) {
-      const Prepared p(test.scene, path, GetParam());
+      Prepared p(test.scene, path, GetParam());
+      if (rng.uniform() < 0.5) p.set_floor(30.0 * kConstraintFloor);
       const RiccatiFactor factor(p.local);
       ASSERT_EQ(factor.status(), RiccatiFactor::Status::Ok);
       const Matrix q = p.q();

@@ -108,12 +108,13 @@ TEST(Precision, DiagonalIsThatOfTheConstraints) {
 
 /// sum_j d (Q^-1)_ij / d delta_j, by differences of the inverse itself.
 Vector differences_of_inverse(const Scene& scene, const Path& path, const Chart& chart,
-                              PreconditionerKind kind) {
+                              PreconditionerKind kind, double floor) {
   const auto inverse_at = [&](const Vector& delta) -> Dense {
     if (kind == PreconditionerKind::Hessian)
-      return Dense(hessian_precision(scene, path.topology, chart, delta)).inverse();
+      return Dense(hessian_precision(scene, path.topology, chart, delta, floor)).inverse();
     Matrix q;
     constraint_matrix(scene, path.topology, chart, delta, q);
+    q.diagonal().array() += floor - kConstraintFloor;
     return q.diagonal().cwiseInverse().asDiagonal();
   };
   const Vector widths = widths_of(scene, path, chart);
@@ -128,12 +129,15 @@ Vector differences_of_inverse(const Scene& scene, const Path& path, const Chart&
 
 // Law: dense_divergence() is the divergence of the inverse.
 TEST(Precision, DivergenceIsThatOfTheInverse) {
-  for (const PreconditionerKind kind :
-       {PreconditionerKind::Diagonal, PreconditionerKind::Hessian}) {
-    const auto errors =
-        errors_of(30, 164, [&](const Scene& scene, const Path& path, const Chart& chart) {
-          const Vector result = dense_divergence(scene, path.topology, chart, kind);
-          const Vector direct = differences_of_inverse(scene, path, chart, kind);
+  for (const auto& [kind, floor] : {std::pair(PreconditionerKind::Diagonal, kConstraintFloor),
+                                    std::pair(PreconditionerKind::Hessian, kConstraintFloor),
+                                    std::pair(PreconditionerKind::Diagonal, 1.0),
+                                    std::pair(PreconditionerKind::Hessian, 1.0)}) {
+    const auto errors = errors_of(
+        30, 164,
+        [&, of = kind, with = floor](const Scene& scene, const Path& path, const Chart& chart) {
+          const Vector result = dense_divergence(scene, path.topology, chart, of, with);
+          const Vector direct = differences_of_inverse(scene, path, chart, of, with);
           return (result - direct).norm() / (direct.norm() + 1e-6);
         });
     EXPECT_LT(errors[errors.size() / 2], 1e-5);
@@ -141,14 +145,17 @@ TEST(Precision, DivergenceIsThatOfTheInverse) {
   }
 }
 
-// Law: a step takes Q from its preconditioner: its density is that of a step with this matrix.
+// Law: a step takes Q from its preconditioner and its trust region: its density is that of a step
+// with this matrix.
 TEST(Precision, StepsTakeIt) {
   const TestScene& test = test_scenes().front();
   Rng rng(165, Stream::Test, 0);
   for (const Path& path : light_paths(test, 50, 165)) {
     for (const PreconditionerKind kind :
-         {PreconditionerKind::Diagonal, PreconditionerKind::Hessian}) {
+         {PreconditionerKind::Constraints, PreconditionerKind::Diagonal,
+          PreconditionerKind::Hessian}) {
       KernelOptions options;
+      options.trust = 0.3;
       options.preconditioner = kind;
       options.drift = Drift::None;
       ChainState state;
@@ -158,10 +165,14 @@ TEST(Precision, StepsTakeIt) {
       ASSERT_TRUE(state.finite);
       Linearization at;
       linearize(test.scene, path.topology, state.chart, DerivativeMethod::Jet, {false, true}, at);
-      const Matrix q =
-          kind == PreconditionerKind::Diagonal
-              ? diagonal_precision(at)
-              : hessian_precision(test.scene, path.topology, state.chart, zero(state.chart));
+      at.floor = kConstraintFloor / 0.09;
+      const auto matrix = [&]() -> Matrix {
+        if (kind == PreconditionerKind::Constraints) return constraint_matrix(at);
+        if (kind == PreconditionerKind::Diagonal) return diagonal_precision(at);
+        return hessian_precision(test.scene, path.topology, state.chart, zero(state.chart),
+                                 at.floor);
+      };
+      const Matrix q = matrix();
       const StepDistribution expected(options, state.chart.dimension(), *CholeskyFactor::of(q),
                                       nullptr, nullptr);
       const Vector delta = expected.sample(0.5, rng);

@@ -12,9 +12,9 @@ namespace driftlight {
 /// d_j Q by central differences in the chart, 2 d linearizations in all. Each needs Q only as it
 /// acts on one vector, so that all of it costs O(d length). Non-finite where a displaced path does
 /// not exist or Q cannot be factorised. The apertures of the path (none: without that constraint)
-/// keep their widths, axes and distances.
+/// keep their widths, axes and distances. `floor` is that of Linearization.
 Vector divergence(const Scene& scene, const PathTopology& topology, const Chart& chart,
-                  DerivativeMethod method = DerivativeMethod::Hand,
-                  const Apertures& apertures = {});
+                  DerivativeMethod method = DerivativeMethod::Hand, const Apertures& apertures = {},
+                  double floor = kConstraintFloor);
 
 }  // namespace driftlight

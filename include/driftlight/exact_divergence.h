@@ -3,6 +3,7 @@
 /// divergence.h is measured.
 #pragma once
 
+#include "driftlight/gradient.h"
 #include "driftlight/phase_space.h"
 
 namespace driftlight {
@@ -14,7 +15,8 @@ namespace driftlight {
 ///   9 sum_jk dQ_ij/d delta_k P_jk = sum J_i (dw.y + w tr(H P)) + w (H y)_i,   y = P J,
 ///   div(Q^-1) = -P times that / 9.
 /// H comes from Jets of Jets, a block of 4 x 4 coordinates in each walk. Some tens of times as slow
-/// as divergence(). Non-finite where Q has no inverse.
-Vector exact_divergence(const Scene& scene, const PathTopology& topology, const Chart& chart);
+/// as divergence(), whose `floor` is this one. Non-finite where Q has no inverse.
+Vector exact_divergence(const Scene& scene, const PathTopology& topology, const Chart& chart,
+                        double floor = kConstraintFloor);
 
 }  // namespace driftlight

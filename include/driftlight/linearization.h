@@ -72,6 +72,8 @@ struct Stage {
 struct Linearization {
   /// grad U over the tangent coordinates of the chart; empty if not asked for. (d)
   Vector gradient;
+  /// Precision of each coordinate beside its constraints, in Q.
+  double floor = kConstraintFloor;
   int stage_count = 0;  ///< 0 if constraints are not asked for
   int block_count = 0;
   bool has_light_side = false;

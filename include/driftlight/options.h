@@ -52,6 +52,11 @@ struct KernelOptions {
   double scale = 0.32;
   /// If positive, each step draws its scale log-uniformly over this many decades about `scale`.
   double scale_decades = 1;
+  /// Radius of the trust region: (pi trust)^-2 I in the place of the pi^-2 I of (E63.13), in
+  /// radians (Levenberg 1944; Marquardt 1963). The residuals of constraints are linear for short
+  /// steps only: one that is long where f hardly changes misses the narrow lobes that Q aims it at.
+  /// A smaller radius shortens steps there, and leaves those across narrow lobes as they are.
+  double trust = 1;
 };
 
 /// How large steps find their paths.
@@ -95,6 +100,9 @@ struct SplittingOptions {
   std::optional<int> levels;
   /// Steps of a particle at each level.
   int steps = 4;
+  /// KernelOptions::trust of all steps of particles. A family that cannot move in a lobe grows or
+  /// dies as a whole from level to level; to move across lobes matters more than far over the film.
+  double trust = 0.05;
   /// Steps at the last one, whose visits make the image.
   int last_steps = 16;
   /// Samples of each round of the pilot.
