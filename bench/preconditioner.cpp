@@ -46,10 +46,10 @@ void measure_jumps(const Scene& scene, const PathSampler& sampler, const Bootstr
           after.topology.block_count - (after.topology.end == PathEnd::AreaConnection ? 1 : 0);
       for (int k = 0; k < directions; ++k)
         row.directions += (after.coordinates(k) - before(k)).squaredNorm();
-      const auto film = [&](const Vec3d& v) {
+      const auto film_at = [&](const Vec3d& v) {
         return scene.camera().film_position(v, scene.camera().origin);
       };
-      row.film += (film(after.coordinates(0)) - film(before(0))).squaredNorm();
+      row.film += (film_at(after.coordinates(0)) - film_at(before(0))).squaredNorm();
     }
     statistics += chain.statistics();
   }
