@@ -17,11 +17,11 @@
 /// exchanged, and there is the factor (H24) besides. The emitter is at the end of that sweep, with
 /// x_bar the derivative by the point y and v_bar that by the emitted direction v:
 ///   area   both have their share of (H25)
-/// What x_bar is in the end is the derivative by the point on a lens.
 /// A textured emitter's radiance has the partials f_u, f_v by its uv (H37); where it is hit
 ///   x_bar = (I - v n^T / n.v) (duv/dx)^T uv_bar,   v_bar = t x_bar,
 /// and as a block the point y has them in its y_bar.
 ///   spot   v_bar += (H23) for w = -v, with the opposite sign.
+/// On the sensor's side x_bar ends as the derivative by the point on a lens.
 #pragma once
 
 #include "driftlight/hand_path.h"

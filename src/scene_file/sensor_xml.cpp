@@ -244,8 +244,7 @@ Camera read_perspective(Properties& sensor, const FilmSize& film) {
   return camera;
 }
 
-/// A perspective sensor whose focus is at infinity, or where it ends to see, if nothing else is
-/// said.
+/// In focus at the far plane unless it says where, as in Mitsuba.
 Camera read_thin_lens(Properties& sensor, const FilmSize& film) {
   Camera camera = read_perspective(sensor, film);
   if (!sensor.has("apertureRadius"))

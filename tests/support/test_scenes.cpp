@@ -302,6 +302,12 @@ Scene stage() {
   return make->build();
 }
 
+void set_small_film(Camera& camera) {
+  camera.half_height = 0.375;
+  camera.film_width = 32;
+  camera.film_height = 24;
+}
+
 }  // namespace
 
 Scene coated(bool with_point) {
@@ -349,9 +355,7 @@ Scene coated(bool with_point) {
   make->add_shape(round_mesh({-1.4, 1.9, -0.5}, 0.35, 4, false), black, Rgbd{6, 7, 8});
   if (with_point) make->add_emitter(PointEmitter{{1.3, 2.4, 1.2}, {3, 3, 2.5}});
   Camera camera = look_at({0, 1.4, 3.6}, {0, 0.9, 0}, 0.5);
-  camera.half_height = 0.375;
-  camera.film_width = 32;
-  camera.film_height = 24;
+  set_small_film(camera);
   make->set_camera(camera);
   return make->build();
 }
@@ -402,9 +406,7 @@ Scene plan(bool with_caustics) {
   Camera camera = look_at({0.8, 2.6, 3.6}, {0, 0.7, 0}, 0.5);
   camera.projection = Camera::Projection::Orthographic;
   camera.scale = 3.6;
-  camera.half_height = 0.375;
-  camera.film_width = 32;
-  camera.film_height = 24;
+  set_small_film(camera);
   make->set_camera(camera);
   return make->build();
 }
@@ -435,9 +437,7 @@ Scene lens(bool with_caustics) {
   Camera camera = look_at({0, 1.4, 3.8}, {0, 0.7, 0}, 0.5);
   camera.lens_radius = 0.2;
   camera.focus_depth = 2.6;
-  camera.half_height = 0.375;
-  camera.film_width = 32;
-  camera.film_height = 24;
+  set_small_film(camera);
   make->set_camera(camera);
   return make->build();
 }
