@@ -22,19 +22,23 @@ class BrightnessMap {
   /// smoothed, and kept above a tenth of the mean. 1 everywhere if nothing was found.
   BrightnessMap(const std::vector<FilmValue>& found, double samples);
 
+  /// Adds light that those samples do not know of, cut already: the geometric mean of the
+  /// arithmetic and the harmonic mean over the parts of a cell, smoothed. Light b of a pixel,
+  /// carried in portions in proportion to m, takes b / m of them, for a squared relative error in
+  /// proportion to m / b. The sum of the one times that of the other is least, over pixels of one
+  /// m, for m^2 = sum b / sum 1 / b: a few bright pixels do not set it. Nothing, if nothing was
+  /// found.
+  void add(const std::vector<FilmValue>& found, double samples);
+
   double operator()(const Vec2d& film) const;
-  double max() const;
+  /// So bright that a film in units of it does not overflow.
+  double film_unit() const;
 
  private:
-  static constexpr int kCells = 16;  ///< on a side
-
-  static std::size_t index(int x, int y) {
-    return static_cast<std::size_t>(y) * kCells + static_cast<std::size_t>(x);
-  }
-  double& cell(int x, int y) { return cells_[index(x, y)]; }
-  double cell(int x, int y) const { return cells_[index(x, y)]; }
+  double cell(int x, int y) const;
 
   std::vector<double> cells_;
+  bool dark_ = true;  ///< nothing was found
 };
 
 }  // namespace driftlight

@@ -31,12 +31,12 @@ struct Redistribution {
   StepLayers* layers;
   Pilot pilot;
   Remainder remainder;
-  Film film;       ///< of the chains, in units of `unit`
-  double unit;     ///< bright enough that fixed point does not overflow
+  Film film;  ///< of the chains, in units of `unit`
+  SplittingShare splitting;
+  double unit;
   double deposit;  ///< epsilon
   ExactSum remainders;
   std::optional<ProbedStarts> probed;  ///< if gradients are checked
-  SplittingShare splitting;
 
   Redistribution(const Scene& of_scene, const LangevinOptions& with, const RenderOptions& render)
       : scene(of_scene),
@@ -46,9 +46,9 @@ struct Redistribution {
         remainder(scene, pilot.guide, pilot.brightness,
                   options.redistribution.threshold.value_or(kLeastThreshold)),
         film(scene.camera().film_width, scene.camera().film_height, scene.camera().filter),
-        unit(64.0 * pilot.brightness.max()),
-        deposit(kLeastDeposit),
-        splitting(scene, options, render, remainder, pilot.brightness, unit) {
+        splitting(scene, options, render, remainder, pilot.brightness),
+        unit(pilot.brightness.film_unit()),
+        deposit(kLeastDeposit) {
     if (render.check_gradients) probed.emplace(scene, options, render.seed);
     if (!options.redistribution.threshold)
       remainder.set_tau(choose_threshold(scene, options, pilot, remainder, splitting, render.seed));

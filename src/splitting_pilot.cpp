@@ -32,6 +32,9 @@ constexpr double kMostDeposit = 64.0;
 /// Fewest and most samples of the top level for each of the scene.
 constexpr double kFewest = 0.02;
 constexpr double kMost = 8.0;
+/// Families of more light, over the median, do not tell more of how bright the film is where they
+/// happened to fall.
+constexpr double kBrightFamily = 8.0;
 
 /// Sums over samples.
 struct Noise {
@@ -39,11 +42,15 @@ struct Noise {
   double remainder = 0;  ///< r^2, as the particles know it
 };
 
+/// What a family brings to the pixels, at one point of each.
+using FamilyLight = std::vector<FilmValue>;
+
 struct PilotRun {
   std::map<LobeSequence, Noise> noise;
   double steps = 0;   ///< of all particles
   double pixels = 0;  ///< sum of F_p^2 over the pixels p, F_p what a family brings to one
   double alone = 0;   ///< the same sum over the particles of each sample one by one
+  std::vector<FamilyLight> families;
   std::vector<LevelFigures> levels;
 
   PilotRun& operator+=(const PilotRun& other) {
@@ -54,10 +61,17 @@ struct PilotRun {
     steps += other.steps;
     pixels += other.pixels;
     alone += other.alone;
+    families.insert(families.end(), other.families.begin(), other.families.end());
     levels.resize(std::max(levels.size(), other.levels.size()));
     for (std::size_t k = 0; k < other.levels.size(); ++k) levels[k] += other.levels[k];
     return *this;
   }
+};
+
+/// What one brings to a pixel.
+struct PixelLight {
+  double amount = 0;  ///< in units of the brightness
+  FilmValue light = {Vec2d::Zero(), 0.0};
 };
 
 /// A pilot's splitter with what it is to do.
@@ -71,7 +85,7 @@ PilotRun run_task(const Setup& pilot, const SplittingPlan& plan, std::uint64_t f
   PilotRun result;
   Splitter splitter = pilot.splitter;
   std::map<LobeSequence, double> family;
-  std::map<std::size_t, double> pixels;
+  std::map<std::size_t, PixelLight> pixels;
   std::map<std::pair<int, std::size_t>, double> alone;  ///< by particle and pixel
   for (std::uint64_t i = first; i < first + kTask; ++i) {
     Rng rng(pilot.seed, Stream::SplittingPilot, i);
@@ -84,12 +98,18 @@ PilotRun run_task(const Setup& pilot, const SplittingPlan& plan, std::uint64_t f
         [&](LobeSequence sequence, int particle, const Share& share, const Rgbd&, double amount) {
           const std::size_t pixel = pilot.camera.pixel(share.film);
           family[sequence] += amount;
-          pixels[pixel] += amount;
+          PixelLight& at = pixels[pixel];
+          at.amount += amount;
+          at.light = {share.film, at.light.value + amount * share.brightness};
           alone[{particle, pixel}] += amount;
           result.noise[sequence].remainder += amount * share.excess();
         });
     for (const auto& [sequence, sum] : family) result.noise[sequence].families += sum * sum;
-    for (const auto& [pixel, sum] : pixels) result.pixels += sum * sum;
+    if (!pixels.empty()) result.families.emplace_back();
+    for (const auto& [pixel, at] : pixels) {
+      result.pixels += at.amount * at.amount;
+      result.families.back().push_back(at.light);
+    }
     for (const auto& [place, sum] : alone) result.alone += sum * sum;
   }
   result.levels = splitter.take_figures();
@@ -129,6 +149,35 @@ void leave_out_levels(const std::vector<LevelFigures>& figures, TemperedScenes& 
   }
 }
 
+/// Noise of what samples leave that splitting by this plan would save.
+double saving(const PilotRun& run, const SplittingPlan& plan) {
+  double sum = 0.0;
+  for (const auto& [sequence, noise] : run.noise)
+    if (plan.takes(sequence)) sum += noise.remainder - noise.families;
+  return sum;
+}
+
+/// All light, with that of bright families cut.
+std::vector<FilmValue> without_outliers(const std::vector<FamilyLight>& families) {
+  if (families.empty()) return {};
+  const auto total = [](const FamilyLight& family) {
+    double sum = 0.0;
+    for (const FilmValue& at : family) sum += at.value;
+    return sum;
+  };
+  std::vector<double> totals(families.size());
+  std::transform(families.begin(), families.end(), totals.begin(), total);
+  const auto middle = totals.begin() + static_cast<std::ptrdiff_t>(totals.size() / 2);
+  std::nth_element(totals.begin(), middle, totals.end());
+  const double most = kBrightFamily * *middle;
+  std::vector<FilmValue> result;
+  for (const FamilyLight& family : families) {
+    const double share = std::min(1.0, most / total(family));
+    for (const FilmValue& at : family) result.push_back({at.film, share * at.value});
+  }
+  return result;
+}
+
 /// Deposit and rate, from a run by the plan as it is. With v the noise of a sample of the top
 /// level, c its cost and r the rate, noise times time is (1 + v / r) (1 + r c) of that of samples
 /// without noise of theirs in what is left to splitting; r = sqrt(v / c) makes the least of it,
@@ -150,7 +199,8 @@ double set_effort(const PilotRun& run, double samples, int last_steps, Splitting
 }  // namespace
 
 SplittingPlan plan_splitting(TemperedScenes& scenes, const Splitter& prototype,
-                             const LangevinOptions& options, std::uint64_t seed) {
+                             const LangevinOptions& options, std::uint64_t seed,
+                             BrightnessMap& brightness) {
   const Setup pilot{prototype, scenes[0].camera(), seed};
   const auto tasks = static_cast<std::uint64_t>(options.splitting.pilot) / kTask;
   const std::uint64_t samples = std::max<std::uint64_t>(1, tasks) * kTask;
@@ -158,24 +208,25 @@ SplittingPlan plan_splitting(TemperedScenes& scenes, const Splitter& prototype,
   const SplittingPlan everything{.some = true, .deposit = kPilotDeposit};
   const PilotRun first = run(pilot, everything, 0, samples);
   SplittingPlan plan = everything;
-  double saved = 0.0;
   for (const auto& [sequence, noise] : first.noise) {
-    if (!options.splitting.all && noise.remainder < kWorth * noise.families) {
+    if (!options.splitting.all && noise.remainder < kWorth * noise.families)
       plan.left.push_back(sequence);
-      continue;
-    }
-    ++plan.known;
-    saved += noise.remainder - noise.families;
+    else
+      ++plan.known;
   }
-  if (!options.splitting.all && saved < kLeastSaving * count) return {};
-  if (!options.splitting.levels)
-    leave_out_levels(run(pilot, plan, samples, samples).levels, scenes);
+  if (!options.splitting.all && saving(first, plan) < kLeastSaving * count) return {};
+  const PilotRun second = run(pilot, plan, samples, samples);
+  if (!options.splitting.levels) leave_out_levels(second.levels, scenes);
+  brightness.add(without_outliers(second.families), count);
   plan.deposit = kLightDeposit;
   // Twice, as a sample starts only so many particles: one of great weight hides what it costs.
   double noise = 0.0;
-  for (std::uint64_t round = 2; round <= 3; ++round)
-    noise = set_effort(run(pilot, plan, round * samples, samples), count,
-                       options.splitting.last_steps, plan);
+  double saved = 0.0;
+  for (std::uint64_t round = 2; round <= 3; ++round) {
+    const PilotRun result = run(pilot, plan, round * samples, samples);
+    saved = std::max(saved, saving(result, plan));
+    noise = set_effort(result, count, options.splitting.last_steps, plan);
+  }
   // Sequences that are cheap to split one by one may cost more than they save all the same.
   if (!options.splitting.all && noise > 1.0 + saved / (kWorth * count)) return {};
   return plan;

@@ -16,7 +16,7 @@ constexpr double kFewFamilies = 16.0;
 
 SplittingShare::SplittingShare(const Scene& scene, const LangevinOptions& options,
                                const RenderOptions& render, const Remainder& remainder,
-                               const BrightnessMap& brightness, double unit)
+                               BrightnessMap& brightness)
     : options_(options),
       remainder_(remainder),
       brightness_(brightness),
@@ -24,9 +24,10 @@ SplittingShare::SplittingShare(const Scene& scene, const LangevinOptions& option
       levels_(scene, options.mode == Mode::Splitting ? options.splitting.levels : std::optional(0)),
       top_guide_(levels_[levels_.top()]),
       film_(scene.camera().film_width, scene.camera().film_height, scene.camera().filter),
-      unit_(unit),
       tiles_(scene.camera().film_width, scene.camera().film_height) {
-  if (levels_.top() > 0) plan_ = plan_splitting(levels_, splitter(), options, render.seed);
+  if (levels_.top() > 0)
+    plan_ = plan_splitting(levels_, splitter(), options, render.seed, brightness);
+  unit_ = brightness.film_unit();
 }
 
 void SplittingShare::Sampler::sample(const Vec2d& film, Rng& rng) {

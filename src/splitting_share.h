@@ -16,10 +16,10 @@ namespace driftlight {
 /// The part of a render that tempered splitting has: levels, plan, film, and what is counted.
 class SplittingShare {
  public:
-  /// Plans it, in Mode::Splitting by a pilot; in another mode it has nothing. The film counts in
-  /// units of the brightness `unit`. All references must outlive it.
+  /// Plans it, in Mode::Splitting by a pilot, which may raise the brightness, that of the
+  /// remainder; in another mode it has nothing. All references must outlive it.
   SplittingShare(const Scene& scene, const LangevinOptions& options, const RenderOptions& render,
-                 const Remainder& remainder, const BrightnessMap& brightness, double unit);
+                 const Remainder& remainder, BrightnessMap& brightness);
 
   /// Whether particles carry what samples leave of such a path.
   bool takes(const PathTopology& path) const {
@@ -64,8 +64,8 @@ class SplittingShare {
   TemperedScenes levels_;
   EmissionGuide top_guide_;
   SplittingPlan plan_;
-  Film film_;
-  double unit_;
+  Film film_;  ///< in units of `unit`
+  double unit_ = 1;
   ExactSum families_;  ///< in particles
   ExactSum squared_families_;
   FamilyTiles tiles_;

@@ -76,7 +76,7 @@ TEST(BrightnessMap, GivesTheMeanOfAnEvenFilm) {
   const BrightnessMap map(found, 64 * 64);
   EXPECT_NEAR(map({0.3, 0.8}), 3.0, 1e-12);
   EXPECT_NEAR(map({0.0, 1.0}), 3.0, 1e-12);
-  EXPECT_NEAR(map.max(), 3.0, 1e-12);
+  EXPECT_NEAR(map.film_unit(), 64.0 * 3.0, 1e-9);
 }
 
 /// A tenth of the mean is left where nothing was found, and one firefly does not show.
@@ -94,6 +94,35 @@ TEST(BrightnessMap, IsPositiveAndCutsFireflies) {
 TEST(BrightnessMap, IsOneWithoutLight) {
   const BrightnessMap map({}, 100);
   EXPECT_EQ(map({0.5, 0.5}), 1.0);
+}
+
+/// Even light on one half; then with a point in each cell that is sixteen times as bright.
+TEST(BrightnessMap, AddsLightWithoutItsBrightestPoints) {
+  std::vector<FilmValue> found;
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 32; ++x) found.push_back({{(x + 0.5) / 64, (y + 0.5) / 64}, 1.0});
+  BrightnessMap alone({}, 100);
+  alone.add({}, 100);
+  EXPECT_EQ(alone({0.5, 0.5}), 1.0);
+  alone.add(found, 64 * 64);
+  const double even = 0.1 * 0.5 + 0.9;
+  EXPECT_NEAR(alone({0.05, 0.5}), even, 1e-12);
+  EXPECT_NEAR(alone({0.95, 0.5}), 0.05, 1e-12);
+
+  BrightnessMap both(found, 64 * 64);
+  both.add(found, 64 * 64);
+  EXPECT_NEAR(both({0.05, 0.5}), 2.0 * even, 1e-12);
+
+  const std::size_t count = found.size();
+  for (std::size_t i = 0; i < count; ++i)
+    if (i % 4 == 0 && i / 32 % 4 == 0) found.push_back({found[i].film, 15.0});
+  BrightnessMap bright({}, 100);
+  bright.add(found, 64 * 64);
+  // The mean is 0.5 (1 + 15 / 16); of the sixteen parts of a cell one has 16, the others 1.
+  const double floor = 0.1 * 0.5 * 31.0 / 16.0;
+  const double dim = floor + 0.9;
+  const double lit = floor + 0.9 * 16.0;
+  EXPECT_NEAR(bright({0.05, 0.5}), std::sqrt((15 * dim + lit) / (15 / dim + 1 / lit)), 1e-12);
 }
 
 LangevinResult render_small(const Scene& scene, int threads, std::optional<double> threshold,
