@@ -74,6 +74,11 @@ double GaussianStep::log_density(const Vector& offset) const {
   return log_norm_ - 0.5 * ((along - mean_).array() / deviation_.array()).square().sum();
 }
 
+GaussianStep GradientMoments::step(const LmcOptions& options) const {
+  const Vector m = (square.array().sqrt() + kStabilizer).inverse().max(kLeastM).min(kLargestM);
+  return GaussianStep::langevin(direction, m, options.step, options.sigma);
+}
+
 double GradientMemory::weight(const LmcOptions& options) const {
   return std::pow(static_cast<double>(count_) + 1.0, -options.adaptation_decay);
 }
@@ -84,16 +89,14 @@ Vector GradientMemory::bounded(const Vector& gradient, const LmcOptions& options
   return options.gradient_bound / length * gradient;
 }
 
-GaussianStep GradientMemory::step(const Vector& gradient, const LmcOptions& options) const {
-  Vector direction = gradient;
-  Vector square = gradient.cwiseAbs2();
+GradientMoments GradientMemory::moments(const Vector& gradient, const LmcOptions& options) const {
+  GradientMoments result{gradient, gradient.cwiseAbs2()};
   if (count_ > 0) {
     const double former = options.momentum * weight(options);
-    direction = former * first_ + (1.0 - former) * gradient;
-    square = options.locality * square + (1.0 - options.locality) * second_;
+    result.direction = former * first_ + (1.0 - former) * gradient;
+    result.square = options.locality * result.square + (1.0 - options.locality) * second_;
   }
-  const Vector m = (square.array().sqrt() + kStabilizer).inverse().max(kLeastM).min(kLargestM);
-  return GaussianStep::langevin(direction, m, options.step, options.sigma);
+  return result;
 }
 
 void GradientMemory::add(const Vector& gradient, const LmcOptions& options) {

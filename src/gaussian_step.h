@@ -51,6 +51,15 @@ class GaussianStep {
   void set_norm();
 };
 
+/// What a step of GaussianStep::langevin is made from: the direction of its drift, and the squares
+/// of gradients by coordinate, whose roots M is the inverse of.
+struct GradientMoments {
+  Vector direction;
+  Vector square;
+
+  GaussianStep step(const LmcOptions& options) const;
+};
+
 /// Memory of the gradients at the points of a chain, for GaussianStep::langevin: Adam's moments
 /// (Luan et al. 2020, section 5.1).
 ///
@@ -61,8 +70,8 @@ class GaussianStep {
 /// w_t. What stays as it was for ever is the weight of the point's own gradient in M.
 class GradientMemory {
  public:
-  /// The Gaussian at a point of this gradient.
-  GaussianStep step(const Vector& gradient, const LmcOptions& options) const;
+  /// Of the step at a point of this gradient.
+  GradientMoments moments(const Vector& gradient, const LmcOptions& options) const;
   /// The chain has been at a point of this gradient.
   void add(const Vector& gradient, const LmcOptions& options);
 

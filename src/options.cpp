@@ -220,24 +220,29 @@ std::vector<OptionEntry> entries(PrimaryOptions& options) {
 
 std::vector<OptionEntry> entries(MmltOptions& options) {
   std::vector<OptionEntry> result = entries(static_cast<PrimaryOptions&>(options));
-  result.insert(
-      result.begin() + 1,
+  const std::vector<OptionEntry> more{
       choice("large_steps", options.large_steps, std::array<std::string_view, 2>{"one", "all"},
              "proposals drawn anew: of one strategy, or a whole bidirectional sample, of "
-             "which one path goes on"));
+             "which one path goes on"),
+      choice("delayed_rejection", options.delayed_rejection,
+             std::array<std::string_view, 2>{"off", "on"},
+             "a rejected small step is followed by a second, smaller one"),
+      number("second_scale", options.second_scale, Range<double>{.low = 0, .high = 1, .open = true},
+             "scale of that second step, over that of steps from step_min to step_max")};
+  result.insert(result.begin() + 1, more.begin(), more.end());
   return result;
 }
 
 namespace {
 
-/// Those of MMLT, and behind the first two `more`.
+/// Those of MMLT, and behind its own `more`.
 std::vector<OptionEntry> gaussian_step_entries(GaussianStepOptions& options,
                                                std::vector<OptionEntry> more) {
   std::vector<OptionEntry> result = entries(static_cast<MmltOptions&>(options));
   more.insert(more.begin(),
               number("isotropic_probability", options.isotropic_probability, Range<double>{0, 1},
                      "share of the small steps that are those of mmlt"));
-  result.insert(result.begin() + 2, more.begin(), more.end());
+  result.insert(result.begin() + 4, more.begin(), more.end());
   return result;
 }
 
@@ -266,7 +271,10 @@ std::vector<OptionEntry> entries(LmcOptions& options) {
               "weight of the current gradient in the preconditioner"),
        number("adaptation_decay", options.adaptation_decay,
               Range<double>{.low = 0, .high = 1, .open = true},
-              "the t-th gradient weighs t^-adaptation_decay among former ones")});
+              "the t-th gradient weighs t^-adaptation_decay among former ones"),
+       number("cache", options.cache, Range<int>{0, 1000000},
+              "points of a strategy at which a pilot remembers gradients for all steps; 0: chains "
+              "do, as they go")});
 }
 
 namespace {

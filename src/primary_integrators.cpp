@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "chain_run.h"
@@ -17,6 +19,10 @@
 
 namespace driftlight {
 namespace {
+
+/// Mutations of the pilot of LMC's cache, for each of its points; and its share of the bootstrap.
+constexpr double kCacheMutations = 64.0;
+constexpr int kCacheBootstrap = 8;
 
 /// Points of PrimaryTarget, and chains of them.
 class PointSampler {
@@ -47,8 +53,10 @@ class NumbersSampler {
   using Point = StrategyNumbers;
   using Chain = StrategyChain;
 
-  NumbersSampler(const StrategyTarget& target, const StrategyMethod& method)
-      : target_(target), method_(method) {}
+  /// The cache may be null.
+  NumbersSampler(const StrategyTarget& target, const StrategyMethod& method,
+                 std::shared_ptr<const GradientCache> cache)
+      : target_(target), method_(method), cache_(std::move(cache)) {}
 
   Point point(std::uint64_t seed, std::size_t i, int edges) const {
     Rng rng(seed, Stream::Bootstrap, i);
@@ -64,12 +72,13 @@ class NumbersSampler {
     return (point.edges() + 1) * place_.target;
   }
   std::unique_ptr<Chain> chain(const Point& start, Film& film, const Rng& rng) const {
-    return std::make_unique<Chain>(target_, method_, film, start, rng);
+    return std::make_unique<Chain>(target_, method_, cache_.get(), film, start, rng);
   }
 
  private:
   StrategyTarget target_;
   const StrategyMethod& method_;
+  std::shared_ptr<const GradientCache> cache_;
   PrimaryPlace place_;
 };
 
@@ -184,6 +193,30 @@ LangevinResult render_primary(const Scene& scene, const PrimaryOptions& options,
   });
 }
 
+/// What chains of their own, which adapt as they go and are then forgotten, know of gradients. So
+/// the chains of the render do not depend on it.
+std::shared_ptr<const GradientCache> run_cache_pilot(const Scene& scene,
+                                                     const StrategyTarget& target, Lengths lengths,
+                                                     int min_edges, const LmcOptions& options,
+                                                     std::uint64_t seed) {
+  LmcOptions online = options;
+  online.bootstrap = std::max(1, options.bootstrap / kCacheBootstrap);
+  const StrategyMethod method = online;
+  Film unseen(scene.camera().film_width, scene.camera().film_height, scene.camera().filter);
+  const PrimaryChains chains(NumbersSampler(target, method, nullptr), online, lengths, min_edges,
+                             ~seed, unseen);
+  std::vector<std::vector<GradientCache::Point>> points(chains.all.size());
+  const auto mutations = static_cast<std::uint64_t>(
+      std::ceil(kCacheMutations * options.cache / static_cast<double>(options.chains)));
+  tbb::parallel_for(std::size_t{0}, chains.all.size(), [&](std::size_t i) {
+    chains.all[i]->record(points[i]);
+    chains.all[i]->run(mutations);
+  });
+  std::vector<GradientCache::Point> all;
+  for (const auto& of_chain : points) all.insert(all.end(), of_chain.begin(), of_chain.end());
+  return std::make_shared<const GradientCache>(all, options);
+}
+
 template <class Options>
 LangevinResult render_by_strategies(const Scene& scene, const Options& options,
                                     const RenderOptions& render, double mutations_per_pixel) {
@@ -193,7 +226,13 @@ LangevinResult render_by_strategies(const Scene& scene, const Options& options,
   const Lengths lengths =
       options.large_steps == StrategyLargeSteps::One ? Lengths::Apart : Lengths::Together;
   return render_primary(scene, options, render, mutations_per_pixel, lengths, [&](int min_edges) {
-    return NumbersSampler(StrategyTarget(scene, unguided, min_edges, options.max_depth), method);
+    const StrategyTarget target(scene, unguided, min_edges, options.max_depth);
+    std::shared_ptr<const GradientCache> cache;
+    if constexpr (std::is_same_v<Options, LmcOptions>) {
+      if (options.cache > 0)
+        cache = run_cache_pilot(scene, target, lengths, min_edges, options, render.seed);
+    }
+    return NumbersSampler(target, method, std::move(cache));
   });
 }
 

@@ -243,6 +243,11 @@ void StrategyNumbers::move_within(const Strategy& strategy, const PrimaryOptions
   if (s == 1) move_range(connection_begin(), kConnection);
 }
 
+void StrategyNumbers::shift(const StrategyNumbers& from, const StrategyNumbers& to) {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count()); ++i)
+    numbers_[i] = wrapped(numbers_[i] + (to.numbers_[i] - from.numbers_[i]));
+}
+
 void StrategyNumbers::move_choices(const Strategy& strategy, const PrimaryOptions& options,
                                    Rng& rng) {
   const StrategyNumbers before = *this;

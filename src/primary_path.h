@@ -72,6 +72,9 @@ class StrategyNumbers {
   /// Moves those of them that do not steer the path.
   void move_choices(const Strategy& strategy, const PrimaryOptions& options, Rng& rng);
 
+  /// Moves each by as much as between the two others, modulo 1.
+  void shift(const StrategyNumbers& from, const StrategyNumbers& to);
+
   /// Hands out numbers from a first one on; the first `period` of them again and again, if there is
   /// one.
   class Reader final : public UniformSource {

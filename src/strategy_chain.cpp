@@ -22,14 +22,27 @@ const MmltOptions& common_options(const StrategyMethod& method) {
   return std::visit([](const auto& of) -> const MmltOptions& { return of; }, method);
 }
 
-StrategyChain::StrategyChain(const StrategyTarget& target, const StrategyMethod& method, Film& film,
-                             const StrategyNumbers& start, Rng rng)
+double acceptance_of(double ratio, Rejections& rejections) {
+  if (std::isnan(ratio)) {
+    ++rejections.non_finite;
+    return 0.0;
+  }
+  return std::min(1.0, ratio);
+}
+
+StrategyChain::StrategyChain(const StrategyTarget& target, const StrategyMethod& method,
+                             const GradientCache* cache, Film& film, const StrategyNumbers& start,
+                             Rng rng)
     : target_(target),
       method_(method),
       options_(common_options(method)),
+      cache_(cache),
       isotropic_probability_(isotropic_probability(method)),
       deposits_(film),
-      rng_(rng) {
+      rng_(rng),
+      second_(options_) {
+  second_.step_min *= options_.second_scale;
+  second_.step_max *= options_.second_scale;
   current_.numbers = start;
   if (options_.large_steps == StrategyLargeSteps::All)
     draw(current_, deposits_.current);
@@ -45,9 +58,11 @@ void StrategyChain::run(std::uint64_t mutations) {
 void StrategyChain::mutate() {
   const bool large = rng_.uniform() < options_.large_step_probability;
   const bool isotropic = !large && rng_.uniform() < isotropic_probability_;
-  const double acceptance = std::min(1.0, large       ? propose_large()
-                                          : isotropic ? propose_isotropic()
-                                                      : propose_gaussian());
+  if (!large && options_.delayed_rejection) return take_delayed_step(isotropic);
+  const double acceptance_ratio = large       ? propose_large()
+                                  : isotropic ? propose_isotropic()
+                                              : propose_gaussian();
+  const double acceptance = acceptance_of(acceptance_ratio, statistics_.rejections);
   statistics_.rejections.non_finite += target_.take_non_finite();
   KernelStatistics& kernel = large ? statistics_.large_step : statistics_.small_step;
   ++kernel.proposed;
@@ -62,10 +77,55 @@ void StrategyChain::mutate() {
   if (!large && !isotropic) remember();
 }
 
+void StrategyChain::take_delayed_step(bool isotropic) {
+  const double first =
+      acceptance_of(isotropic ? propose_isotropic() : propose_gaussian(), statistics_.rejections);
+  ++statistics_.small_step.proposed;
+  statistics_.small_step.accepted += first;
+  double acceptance = 1.0;
+  if (!(rng_.uniform() < first)) {
+    ++(first > 0.0 ? statistics_.rejections.hastings : statistics_.rejections.missed);
+    acceptance = acceptance_of(propose_second(first, isotropic), statistics_.rejections);
+    ++statistics_.second_step.proposed;
+    statistics_.second_step.accepted += acceptance;
+  }
+  statistics_.rejections.non_finite += target_.take_non_finite();
+  if (deposits_.settle(acceptance, rng_)) std::swap(current_, proposed_);
+  if (!isotropic) remember();
+}
+
+double StrategyChain::propose_second(double first_acceptance, bool isotropic) {
+  ghost_.numbers = proposed_.numbers;
+  proposed_.numbers = current_.numbers;
+  move(proposed_.numbers, second_);
+  look(proposed_, strategy_of(proposed_.numbers), deposits_.proposed);
+  if (!proposed_.path) return 0.0;
+  ghost_.numbers.shift(current_.numbers, proposed_.numbers);
+  look(ghost_, strategy_of(ghost_.numbers), ghost_place_);
+  double log_there = 0.0;
+  double log_ghost = 0.0;
+  if (!isotropic) {
+    derive(proposed_);
+    log_there = step_at(proposed_).log_density(offset_);
+    if (ghost_.path) {
+      derive(ghost_);
+      log_ghost = step_at(ghost_).log_density(-offset_);
+    }
+  }
+  const double there = deposits_.proposed.target;
+  double to_ghost = 0.0;
+  if (ghost_.path)
+    to_ghost = acceptance_of(std::exp(log_ghost - log_there) * ratio(ghost_place_.target, there),
+                             statistics_.rejections);
+  const double log_here = isotropic ? 0.0 : log_density_;
+  return std::exp(log_there - log_here) * there * (1.0 - to_ghost) /
+         (deposits_.current.target * (1.0 - first_acceptance));
+}
+
 double StrategyChain::propose_large() {
   proposed_.numbers = StrategyNumbers(edges(), current_.numbers.has_lens(), rng_);
   if (options_.large_steps == StrategyLargeSteps::One) {
-    look(proposed_.numbers.strategy());
+    look(proposed_, proposed_.numbers.strategy(), deposits_.proposed);
     weights_.add((edges() + 1) * deposits_.proposed.target);
     return ratio(deposits_.proposed.target, deposits_.current.target);
   }
@@ -81,38 +141,45 @@ double StrategyChain::propose_large() {
 
 double StrategyChain::propose_isotropic() {
   proposed_.numbers = current_.numbers;
-  if (options_.large_steps == StrategyLargeSteps::One) {
-    proposed_.numbers.move(options_, rng_);
-    look(proposed_.numbers.strategy());
-  } else {
-    proposed_.numbers.move_within(current_.strategy(), options_, rng_);
-    look(current_.strategy());
-  }
+  move(proposed_.numbers, options_);
+  look(proposed_, strategy_of(proposed_.numbers), deposits_.proposed);
   return ratio(deposits_.proposed.target, deposits_.current.target);
 }
 
 double StrategyChain::propose_gaussian() {
   derive(current_);
   const GaussianStep forward = step_at(current_);
-  const Vector offset = forward.sample(rng_);
+  offset_ = forward.sample(rng_);
+  log_density_ = forward.log_density(offset_);
   proposed_.numbers = current_.numbers;
   const Strategy& strategy = current_.strategy();
   proposed_.numbers.move_choices(strategy, options_, rng_);
-  for (int i = 0; i < offset.size(); ++i) {
+  for (int i = 0; i < offset_.size(); ++i) {
     double& u = proposed_.numbers.steering(strategy, i);
-    u = wrapped(u + offset[i]);
+    u = wrapped(u + offset_[i]);
   }
-  look(strategy);
+  look(proposed_, strategy, deposits_.proposed);
   if (!proposed_.path) return 0.0;
   derive(proposed_);
-  const double log_ratio = step_at(proposed_).log_density(-offset) - forward.log_density(offset);
+  const double log_ratio = step_at(proposed_).log_density(-offset_) - log_density_;
   return std::exp(log_ratio) * ratio(deposits_.proposed.target, deposits_.current.target);
 }
 
-void StrategyChain::look(const Strategy& strategy) {
-  proposed_.path = target_(proposed_.numbers, strategy, deposits_.proposed);
-  proposed_.all.reset();
-  proposed_.derived = false;
+void StrategyChain::look(Point& point, const Strategy& strategy, PrimaryPlace& place) {
+  point.path = target_(point.numbers, strategy, place);
+  point.all.reset();
+  point.derived = false;
+}
+
+Strategy StrategyChain::strategy_of(const StrategyNumbers& numbers) const {
+  return options_.large_steps == StrategyLargeSteps::One ? numbers.strategy() : current_.strategy();
+}
+
+void StrategyChain::move(StrategyNumbers& numbers, const PrimaryOptions& sizes) {
+  if (options_.large_steps == StrategyLargeSteps::One)
+    numbers.move(sizes, rng_);
+  else
+    numbers.move_within(current_.strategy(), sizes, rng_);
 }
 
 void StrategyChain::draw(Point& point, PrimaryPlace& place) {
@@ -131,6 +198,10 @@ void StrategyChain::draw(Point& point, PrimaryPlace& place) {
 void StrategyChain::derive(Point& point) {
   if (point.derived) return;
   point.derived = true;
+  if (cache_ != nullptr) {
+    point.step = cache_->step(point.strategy(), steering(point));
+    return;
+  }
   if (const auto* h2mc = std::get_if<H2mcOptions>(&method_)) {
     const bool finite =
         target_.function().gradient_and_hessian(point.numbers, *point.path, derivatives_);
@@ -146,21 +217,33 @@ void StrategyChain::derive(Point& point) {
     point.gradient = GradientMemory::bounded(derivatives_.gradient, std::get<LmcOptions>(method_));
 }
 
+Vector StrategyChain::steering(const Point& point) const {
+  Vector numbers(point.numbers.dimension(point.strategy()));
+  for (int i = 0; i < numbers.size(); ++i) numbers[i] = point.numbers.steering(point.strategy(), i);
+  return numbers;
+}
+
 GaussianStep StrategyChain::step_at(const Point& point) const {
   const auto* lmc = std::get_if<LmcOptions>(&method_);
-  if (lmc == nullptr) return point.step;
+  if (lmc == nullptr || cache_ != nullptr) return point.step;
   const auto [s, t] = point.strategy();
   if (point.gradient.size() == 0)
     return GaussianStep::isotropic(point.numbers.dimension(point.strategy()), lmc->sigma);
   const auto memory = memories_.find({s, t});
-  return (memory != memories_.end() ? memory->second : GradientMemory()).step(point.gradient, *lmc);
+  return (memory != memories_.end() ? memory->second : GradientMemory())
+      .moments(point.gradient, *lmc)
+      .step(*lmc);
 }
 
 void StrategyChain::remember() {
   const auto* lmc = std::get_if<LmcOptions>(&method_);
   if (lmc == nullptr || current_.gradient.size() == 0) return;
   const auto [s, t] = current_.strategy();
-  memories_[{s, t}].add(current_.gradient, *lmc);
+  GradientMemory& memory = memories_[{s, t}];
+  memory.add(current_.gradient, *lmc);
+  if (record_ != nullptr)
+    record_->push_back(
+        {current_.strategy(), steering(current_), memory.moments(current_.gradient, *lmc)});
 }
 
 }  // namespace driftlight

@@ -226,11 +226,27 @@ TEST_F(Cli, InfoCountsTheSceneAndListsTheIntegrators) {
   EXPECT_EQ(scene.exit_code, 0) << scene.err;
   for (const char* part : {"24 x 16", "4 edges", "1 sphere", "1 diffuse", "1 constant"})
     EXPECT_NE(scene.out.find(part), std::string::npos) << part << " in\n" << scene.out;
+  EXPECT_EQ(scene.out.find("limit"), std::string::npos) << scene.out;
   const Outcome integrators = run({"info", "--integrators"});
   EXPECT_EQ(integrators.exit_code, 0) << integrators.err;
   for (const char* part : {"langevin: ", "path: ", "bdpt: ", "light: ", "drift",
                            "none|gradient|full", "epsilon", "balance|power", "max_depth", "doi"})
     EXPECT_NE(integrators.out.find(part), std::string::npos) << part << integrators.out;
+}
+
+TEST_F(Cli, InfoSaysWhatIntegratorsMiss) {
+  write("glass.xml", R"(<scene version="0.6.0">
+    <sensor type="thinlens"><float name="apertureRadius" value="0.1"/><film type="hdrfilm"/>
+    </sensor>
+    <shape type="sphere"><bsdf type="dielectric"/></shape>
+    <shape type="rectangle"><bsdf type="diffuse"><texture type="checkerboard" name="reflectance"/>
+    </bsdf></shape>
+    <emitter type="point"/></scene>)");
+  const Outcome outcome = run({"info", "glass.xml"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  for (const char* part :
+       {"mlt and erpt cannot", "light misses", "path misses", "all miss", "MB of meshes"})
+    EXPECT_NE(outcome.out.find(part), std::string::npos) << part << " in\n" << outcome.out;
 }
 
 TEST_F(Cli, DiffPrintsTheFigures) {

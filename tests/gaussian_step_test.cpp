@@ -8,6 +8,7 @@
 #include <functional>
 #include <vector>
 
+#include "gradient_cache.h"
 #include "primary_sample.h"
 #include "support/chi_square.h"
 #include "support/t_test.h"
@@ -203,8 +204,9 @@ TEST(GradientMemory, KeepsTheTarget) {
   };
   GradientMemory memory;
   for (std::uint64_t run = 0; run < 2; ++run) {
-    expect_stationary([&](const Vector& u) { return memory.step(bounded_gradient(u), options); },
-                      5 + run);
+    expect_stationary(
+        [&](const Vector& u) { return memory.moments(bounded_gradient(u), options).step(options); },
+        5 + run);
     memory.add((Vector(2) << 12.0, -3.0).finished(), options);
     memory.add((Vector(2) << 9.0, 1.0).finished(), options);
   }
@@ -218,9 +220,12 @@ TEST(GradientMemory, ForgetsToLearn) {
   const Vector here = Vector::Constant(4, 3.0);
   const Vector offset = Vector::Constant(4, 0.01);
   const auto change = [&] {
-    const double before = memory.step(here, options).log_density(offset);
+    const auto density = [&] {
+      return memory.moments(here, options).step(options).log_density(offset);
+    };
+    const double before = density();
     memory.add(Vector(10.0 * normals(4, rng)), options);
-    return std::abs(memory.step(here, options).log_density(offset) - before);
+    return std::abs(density() - before);
   };
   double early = 0;
   for (int t = 0; t < 10; ++t) early += change() / 10.0;
@@ -229,6 +234,61 @@ TEST(GradientMemory, ForgetsToLearn) {
   for (int t = 0; t < 10; ++t) late += change() / 10.0;
   EXPECT_GT(early, 0.0);
   EXPECT_LT(late, 0.03 * early);
+}
+
+/// The moments of points nearby, of as many as are kept, and of their own strategy.
+TEST(GradientCache, RemembersWhatIsNear) {
+  LmcOptions options;
+  options.cache = 3;
+  const Strategy strategy{1, 2};
+  const auto point = [](const Strategy& of, double x, double direction) {
+    return GradientCache::Point{
+        of,
+        Vector::Constant(2, x),
+        {Vector::Constant(2, direction), Vector::Constant(2, direction * direction)}};
+  };
+  const GradientCache cache(
+      {point(strategy, 0.5, 4.0), point(strategy, 0.501, 6.0), point({2, 1}, 0.5, 9.0),
+       point(strategy, 0.7, 1.0), point(strategy, 0.9, 2.0)},
+      options);
+  const Vector offset = Vector::Constant(2, 0.003);
+  const auto density = [&](const Strategy& of, double x) {
+    return cache.step(of, Vector::Constant(2, x)).log_density(offset);
+  };
+  const auto expected = [&](double direction, double square) {
+    const GradientMoments moments{Vector::Constant(2, direction), Vector::Constant(2, square)};
+    return moments.step(options).log_density(offset);
+  };
+  EXPECT_DOUBLE_EQ(density(strategy, 0.5), expected(5.0, 26.0));
+  EXPECT_DOUBLE_EQ(density(strategy, 0.7), expected(1.0, 1.0));
+  EXPECT_DOUBLE_EQ(density({2, 1}, 0.505), expected(9.0, 81.0));
+  const double isotropic = GaussianStep::isotropic(2, options.sigma).log_density(offset);
+  EXPECT_DOUBLE_EQ(density(strategy, 0.52), isotropic);
+  EXPECT_DOUBLE_EQ(density(strategy, 0.9), isotropic);
+  EXPECT_DOUBLE_EQ(density({0, 3}, 0.5), isotropic);
+}
+
+/// Points from anywhere, as those of a pilot.
+TEST(GradientCache, KeepsTheTarget) {
+  LmcOptions options;
+  options.step = 0.1;
+  options.sigma = 0.3;
+  options.cache = 2000;
+  const Strategy strategy{0, 2};
+  GradientMemory memory;
+  std::vector<GradientCache::Point> points;
+  Rng rng(8, Stream::Test, 0);
+  for (int i = 0; i < options.cache; ++i) {
+    Vector u(2);
+    u << rng.uniform(), rng.uniform();
+    Vector gradient;
+    Matrix hessian;
+    derive_toy(u, gradient, hessian);
+    memory.add(gradient, options);
+    points.push_back({strategy, u, memory.moments(gradient, options)});
+  }
+  const GradientCache cache(points, options);
+  expect_stationary([&](const Vector& u) { return cache.step(strategy, u); }, 9);
 }
 
 TEST(GradientMemory, CutsLongGradients) {

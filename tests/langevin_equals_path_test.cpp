@@ -232,6 +232,16 @@ TEST_P(PrimaryEqualsPath, TileMeans) {
       return render_pssmlt(loaded.scene, with(PssmltOptions{}), render, amount).image;
     if (name == "h2mc") return render_h2mc(loaded.scene, with(H2mcOptions{}), render, amount).image;
     if (name == "lmc") return render_lmc(loaded.scene, with(LmcOptions{}), render, amount).image;
+    if (name == "lmc_cached") {
+      LmcOptions options = with(LmcOptions{});
+      options.cache = 1000;
+      return render_lmc(loaded.scene, options, render, amount).image;
+    }
+    if (name == "h2mc_delayed") {
+      H2mcOptions options = with(H2mcOptions{});
+      options.delayed_rejection = true;
+      return render_h2mc(loaded.scene, options, render, amount).image;
+    }
     return render_mmlt(loaded.scene, with(MmltOptions{}), render, 2.0 * amount).image;
   };
   test::expect_equal_tiles(name, tiles_over_runs(image), traced_tiles(scene), work.resolution);
@@ -239,14 +249,15 @@ TEST_P(PrimaryEqualsPath, TileMeans) {
 
 INSTANTIATE_TEST_SUITE_P(Some, PrimaryEqualsPath,
                          testing::Values(Case{"cornell_glossy", "mmlt"},
-                                         Case{"limelight", "pssmlt"}, Case{"limelight", "h2mc"},
-                                         Case{"cornell_glossy", "lmc"}, Case{"lens", "lmc"}),
+                                         Case{"limelight", "pssmlt"},
+                                         Case{"limelight", "h2mc_delayed"},
+                                         Case{"cornell_glossy", "lmc_cached"}, Case{"lens", "lmc"}),
                          name_of);
 
 std::vector<Case> all_primary_cases() {
   std::vector<Case> cases;
   for (const auto& scene : works())
-    for (const char* name : {"pssmlt", "mmlt", "h2mc", "lmc"})
+    for (const char* name : {"pssmlt", "mmlt", "h2mc", "h2mc_delayed", "lmc", "lmc_cached"})
       cases.emplace_back(scene.first, name);
   return cases;
 }

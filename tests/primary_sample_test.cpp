@@ -11,6 +11,7 @@
 #include "driftlight/error.h"
 #include "driftlight/render.h"
 #include "primary_target.h"
+#include "strategy_chain.h"
 #include "strategy_target.h"
 #include "support/chi_square.h"
 #include "support/t_test.h"
@@ -197,6 +198,8 @@ TEST(Primary, DoesNotDependOnThreads) {
   h2mc.bootstrap = 1000;
   LmcOptions lmc;
   lmc.bootstrap = 1000;
+  LmcOptions cached = lmc;
+  cached.cache = 100;
   std::vector<std::vector<float>> images;
   for (const int threads : {1, 2, 4}) {
     RenderOptions render;
@@ -206,8 +209,19 @@ TEST(Primary, DoesNotDependOnThreads) {
     images.push_back(render_mmlt(scene, mmlt, render, 4).image.rgb);
     images.push_back(render_h2mc(scene, h2mc, render, 1).image.rgb);
     images.push_back(render_lmc(scene, lmc, render, 1).image.rgb);
+    images.push_back(render_lmc(scene, cached, render, 1).image.rgb);
   }
-  for (std::size_t i = 4; i < images.size(); ++i) EXPECT_EQ(images[i], images[i % 4]);
+  EXPECT_NE(images[3], images[4]);
+  for (std::size_t i = 5; i < images.size(); ++i) EXPECT_EQ(images[i], images[i % 5]);
+}
+
+TEST(StrategyChain, RefusesWhatIsNotANumber) {
+  Rejections rejections;
+  EXPECT_EQ(acceptance_of(0.3, rejections), 0.3);
+  EXPECT_EQ(acceptance_of(kInfinity, rejections), 1.0);
+  EXPECT_EQ(rejections.non_finite, 0U);
+  EXPECT_EQ(acceptance_of(std::numeric_limits<double>::quiet_NaN(), rejections), 0.0);
+  EXPECT_EQ(rejections.non_finite, 1U);
 }
 
 TEST(Primary, OptionsAreChecked) {

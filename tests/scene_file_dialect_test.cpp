@@ -100,6 +100,16 @@ TEST(Dialect, ReadsAWholeSceneOfMitsuba3) {
   expect_near(spot.intensity(), Rgbd(2, 2, 2));
 }
 
+TEST(Dialect, ReadsAThinLensOfMitsuba3) {
+  const SceneDirectory directory;
+  const std::string lens = R"(<sensor type="thinlens"><float name="fov" value="60"/>
+    <float name="aperture_radius" value="0.3"/><float name="focus_distance" value="7"/>
+    <film type="hdrfilm"/></sensor>)";
+  const LoadedScene loaded = directory.load(mitsuba3(lens + kShape + kEmitter));
+  EXPECT_EQ(loaded.scene.camera().lens_radius, 0.3);
+  EXPECT_EQ(loaded.scene.camera().focus_depth, 7);
+}
+
 TEST(Dialect, MessagesSpellNamesAsTheFileDoes) {
   const std::string unknown =
       error_of(lit3(R"(<shape type="sphere"><float name="to_wrold" value="1"/></shape>)"));

@@ -200,6 +200,10 @@ enum class StrategyLargeSteps {
 /// Of one strategy at a time, which is a coordinate (Hachisuka et al. 2014).
 struct MmltOptions : PrimaryOptions {
   StrategyLargeSteps large_steps = StrategyLargeSteps::All;
+  /// A small step that is rejected is followed by a second one, of the sizes of isotropic steps
+  /// times `second_scale` (Rioux-Lavoie et al. 2020).
+  bool delayed_rejection = false;
+  double second_scale = 0.2;
 
   /// Throws OptionError.
   void validate() const;
@@ -233,6 +237,9 @@ struct LmcOptions : GaussianStepOptions {
   double locality = 0.5;
   /// The t-th gradient gets the weight t^-adaptation_decay among former ones.
   double adaptation_decay = 0.7;
+  /// Points of each strategy at which chains of a pilot remember gradients, for all steps of the
+  /// render; 0: its own chains do, as they go.
+  int cache = 0;
 
   /// Throws OptionError.
   void validate() const;

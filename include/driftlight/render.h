@@ -172,9 +172,9 @@ LangevinResult render_h2mc(const Scene& scene, const H2mcOptions& options,
                            const RenderOptions& render, double mutations_per_pixel);
 
 /// Renders with Langevin Monte Carlo (Luan, Zhao, Bala and Gkioulekas 2020, "Langevin Monte Carlo
-/// rendering with gradient-based adaptation"), online: chains as of MMLT, whose small steps follow
-/// the gradient, scaled in each coordinate by former ones. Statistics as of Mode::Chain. Throws as
-/// render_langevin.
+/// rendering with gradient-based adaptation"), online or with a cache: chains as of MMLT, whose
+/// small steps follow the gradient, scaled in each coordinate by former ones. Statistics as of
+/// Mode::Chain. Throws as render_langevin.
 LangevinResult render_lmc(const Scene& scene, const LmcOptions& options,
                           const RenderOptions& render, double mutations_per_pixel);
 

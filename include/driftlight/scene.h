@@ -139,6 +139,8 @@ class Scene {
     std::vector<Bsdf> bsdfs;
   };
   Scene();
+  /// Embree's trees over the shapes, which must not move. Throws RuntimeError if it fails.
+  static std::shared_ptr<const Accelerator> accelerate(const std::vector<Shape>& shapes);
   void choose_emitters_by_power();
 
   Camera camera_;

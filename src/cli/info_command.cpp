@@ -16,6 +16,7 @@
 #include "cli/commands.h"
 #include "cli/max_depth.h"
 #include "cli/print.h"
+#include "cli/scene_limits.h"
 #include "driftlight/options.h"
 #include "driftlight/scene_file.h"
 
@@ -146,6 +147,9 @@ void run(const InfoCommand& command) {
   text += row("bsdfs", list(count_kinds(scene.bsdfs()), kBsdfs));
   text += row("textures", list_textures(scene));
   text += row("emitters", list(count_kinds(scene.emitters()), kEmitters));
+  text += row("memory", fmt::format("{:.3g} MB of meshes and bitmaps, without Embree's trees",
+                                    1e-6 * static_cast<double>(memory_of(scene))));
+  for (const std::string& limit : limits_of(scene)) text += row("limit", limit);
   for (const std::string& notice : loaded.notices) text += row("notice", notice);
   print(text);
 }

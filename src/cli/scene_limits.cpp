@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/scene_limits.h"
+
+#include <algorithm>
+#include <set>
+#include <variant>
+
+#include "bsdf_textures.h"
+
+namespace driftlight::cli {
+namespace {
+
+template <class T>
+std::size_t bytes(const std::vector<T>& values) {
+  return values.size() * sizeof(T);
+}
+
+/// True if light goes on by a delta lobe somewhere, other than straight.
+bool has_smooth_surface(const Scene& scene) {
+  return std::any_of(scene.bsdfs().begin(), scene.bsdfs().end(), [](const Bsdf& bsdf) {
+    return has_delta(bsdf, Scattering::Reflection) ||
+           (has_delta(bsdf, Scattering::Transmission) && delta_eta(bsdf) != 1.0);
+  });
+}
+
+bool has_unhittable_emitter(const Scene& scene) {
+  return std::any_of(scene.emitters().begin(), scene.emitters().end(), [](const Emitter& emitter) {
+    return is_point(emitter) || std::holds_alternative<DirectionalEmitter>(emitter);
+  });
+}
+
+}  // namespace
+
+std::size_t memory_of(const Scene& scene) {
+  std::size_t sum = 0;
+  for (const Shape& shape : scene.shapes())
+    if (const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry))
+      sum +=
+          bytes(mesh->positions) + bytes(mesh->normals) + bytes(mesh->uvs) + bytes(mesh->triangles);
+  std::set<const Bitmap*> bitmaps;
+  const auto add = [&](const Texture& texture) { bitmaps.insert(texture.bitmap.get()); };
+  for (const Bsdf& bsdf : scene.bsdfs()) for_each_texture(bsdf, add);
+  for (const Material& material : scene.materials())
+    if (material.relief != nullptr) add(material.relief->texture);
+  for (const Emitter& emitter : scene.emitters()) {
+    if (const auto* map = std::get_if<EnvironmentMap>(&emitter)) bitmaps.insert(&map->bitmap());
+    const auto* area = std::get_if<AreaEmitter>(&emitter);
+    if (area != nullptr && area->texture != nullptr) add(*area->texture);
+  }
+  for (const Bitmap* bitmap : bitmaps)
+    if (bitmap != nullptr) sum += bytes(bitmap->texels);
+  return sum;
+}
+
+std::vector<std::string> limits_of(const Scene& scene) {
+  std::vector<std::string> lines;
+  const Camera& camera = scene.camera();
+  if (camera.has_lens() || camera.is_orthographic())
+    lines.emplace_back("mlt and erpt cannot render it: they need a pinhole");
+  if (!has_smooth_surface(scene)) return lines;
+  lines.emplace_back("light misses what is seen by way of smooth mirrors and glass");
+  if (!has_unhittable_emitter(scene)) return lines;
+  lines.emplace_back(
+      "path misses light of point, spot and directional emitters by way of smooth mirrors and "
+      "glass");
+  lines.emplace_back("all miss such light where it is seen by way of smooth mirrors and glass");
+  return lines;
+}
+
+}  // namespace driftlight::cli

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "shape_extent.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace driftlight {
+namespace {
+
+/// Area, centroid and covariance of the uniform distribution on a surface.
+struct ShapeMoments {
+  double area = 0;
+  Vec3d mean = Vec3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+};
+
+/// A triangle has E[p p^T] = (s s^T + sum_i p_i p_i^T) / 12 with s = p_0 + p_1 + p_2.
+ShapeMoments moments(const TriangleMesh& mesh) {
+  const Vec3d origin = mesh.positions.front().cast<double>();
+  ShapeMoments m;
+  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    const std::array<Vec3d, 3> p = corners(mesh, i);
+    const double area = 0.5 * (p[1] - p[0]).cross(p[2] - p[0]).norm();
+    Vec3d sum = Vec3d::Zero();
+    Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
+    for (const Vec3d& corner : p) {
+      const Vec3d q = corner - origin;
+      sum += q;
+      products += q * q.transpose();
+    }
+    m.area += area;
+    m.mean += area / 3.0 * sum;
+    second += area / 12.0 * (sum * sum.transpose() + products);
+  }
+  m.mean /= m.area;
+  m.covariance = second / m.area - m.mean * m.mean.transpose();
+  m.mean += origin;
+  return m;
+}
+
+ShapeMoments moments(const Sphere& sphere) {
+  const double r2 = sphere.radius * sphere.radius;
+  return {4.0 * kPi * r2, sphere.center, Eigen::Matrix3d::Identity() * (r2 / 3.0)};
+}
+
+ShapeMoments moments(const Disk& disk) {
+  return {kPi * disk.u.cross(disk.v).norm(), disk.center,
+          0.25 * (disk.u * disk.u.transpose() + disk.v * disk.v.transpose())};
+}
+
+ShapeMoments moments(const Cylinder& cylinder) {
+  const Vec3d axis = cylinder.axis();
+  const double across2 = 0.5 * cylinder.radius * cylinder.radius;
+  const double along2 = cylinder.length * cylinder.length / 12.0;
+  return {2.0 * kPi * cylinder.radius * cylinder.length,
+          cylinder.base + 0.5 * cylinder.length * axis,
+          across2 * Eigen::Matrix3d::Identity() + (along2 - across2) * axis * axis.transpose()};
+}
+
+}  // namespace
+
+Eigen::AlignedBox3d bounds_of(const TriangleMesh& mesh) {
+  Eigen::AlignedBox3d box;
+  for (const auto& p : mesh.positions) box.extend(p.cast<double>());
+  return box;
+}
+Eigen::AlignedBox3d bounds_of(const Sphere& sphere) {
+  return {sphere.center.array() - sphere.radius, sphere.center.array() + sphere.radius};
+}
+Eigen::AlignedBox3d bounds_of(const Disk& disk) {
+  const Vec3d half = (disk.u.array().square() + disk.v.array().square()).sqrt();
+  return {disk.center - half, disk.center + half};
+}
+Eigen::AlignedBox3d bounds_of(const Cylinder& cylinder) {
+  const Vec3d axis = cylinder.axis();
+  const Vec3d half = cylinder.radius * (1.0 - axis.array().square()).max(0.0).sqrt();
+  const Vec3d end = cylinder.base + cylinder.length * axis;
+  return {cylinder.base.cwiseMin(end) - half, cylinder.base.cwiseMax(end) + half};
+}
+
+ShapeExtent extent_of(const Geometry& geometry) {
+  const ShapeMoments m = std::visit([](const auto& shape) { return moments(shape); }, geometry);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(m.covariance);
+  const Vec3d variance = axes.eigenvalues().cwiseMax(0.0);
+  ShapeExtent extent;
+  extent.area = m.area;
+  extent.centroid = m.mean;
+  extent.radius = std::sqrt(variance.sum());
+  // Positions are floats: what is thinner than their rounding is flat.
+  const double thinnest = 1e-10 * variance.maxCoeff();
+  extent.planar = variance.x() <= thinnest;
+  for (int i = 0; i < 3; ++i)
+    if (variance[i] > thinnest)
+      extent.whitening.row(i) = axes.eigenvectors().col(i).transpose() / std::sqrt(variance[i]);
+  return extent;
+}
+
+}  // namespace driftlight
