@@ -28,7 +28,8 @@ double cut_mean(const std::vector<FilmValue>& found, double samples) {
 /// Over the film, in rows.
 struct Grid {
   explicit Grid(int with_width)
-      : width(with_width), values(static_cast<std::size_t>(width) * width, 0.0) {}
+      : width(with_width),
+        values(static_cast<std::size_t>(width) * static_cast<std::size_t>(width), 0.0) {}
   Grid(const std::vector<FilmValue>& found, double samples, double cut, int with_width)
       : Grid(with_width) {
     const double share = width * width / samples;
