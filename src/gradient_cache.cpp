@@ -39,11 +39,12 @@ class GradientCache::Tree {
     std::array<double, kNearest> squared_distances{};
     nanoflann::KNNResultSet<double, Eigen::Index> nearest(kNearest);
     nearest.init(indices.data(), squared_distances.data());
+    // The search leaves out what is farther than the last place, which nothing has yet.
+    squared_distances.back() = kRadius * kRadius * static_cast<double>(numbers.size());
     tree_.index->findNeighbors(nearest, numbers.data(), nanoflann::SearchParams());
-    const double most = kRadius * kRadius * static_cast<double>(numbers.size());
     GradientMoments sum{Vector::Zero(numbers.size()), Vector::Zero(numbers.size())};
     double count = 0.0;
-    for (std::size_t i = 0; i < nearest.size() && squared_distances[i] <= most; ++i) {
+    for (std::size_t i = 0; i < nearest.size(); ++i) {
       const GradientMoments& moments = points_[static_cast<std::size_t>(indices[i])].moments;
       sum.direction += moments.direction;
       sum.square += moments.square;
