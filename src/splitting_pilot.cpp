@@ -214,21 +214,26 @@ SplittingPlan plan_splitting(TemperedScenes& scenes, const Splitter& prototype,
     else
       ++plan.known;
   }
-  if (!options.splitting.all && saving(first, plan) < kLeastSaving * count) return {};
+  double saved = saving(first, plan);
+  if (!options.splitting.all && saved < kLeastSaving * count) return {};
   const PilotRun second = run(pilot, plan, samples, samples);
   if (!options.splitting.levels) leave_out_levels(second.levels, scenes);
+  const BrightnessMap before = brightness;
   brightness.add(without_outliers(second.families), count);
   plan.deposit = kLightDeposit;
   // Twice, as a sample starts only so many particles: one of great weight hides what it costs.
   double noise = 0.0;
-  double saved = 0.0;
   for (std::uint64_t round = 2; round <= 3; ++round) {
     const PilotRun result = run(pilot, plan, round * samples, samples);
-    saved = std::max(saved, saving(result, plan));
+    // A few rare families may make too much of it, but hardly too little.
+    saved = std::min(saved, saving(result, plan));
     noise = set_effort(result, count, options.splitting.last_steps, plan);
   }
   // Sequences that are cheap to split one by one may cost more than they save all the same.
-  if (!options.splitting.all && noise > 1.0 + saved / (kWorth * count)) return {};
+  if (!options.splitting.all && noise > 1.0 + saved / (kWorth * count)) {
+    brightness = before;
+    return {};
+  }
   return plan;
 }
 

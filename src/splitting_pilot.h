@@ -29,8 +29,8 @@ namespace driftlight {
 /// alone, and B from what those of one sample have in common, while c = 1 + D / e. So v c is least
 /// for e = sqrt(B D / A).
 ///
-/// `brightness`, that of the prototype and its remainder, is raised by what particles find, once it
-/// is known what splitting takes: where only they find light it was far too low, and effort is
+/// `brightness`, that of the prototype and its remainder, is raised by what particles find, if
+/// splitting takes anything: where only they find light it was far too low, and effort is
 /// spread over the film in proportion to light over it.
 ///
 /// The levels of the prototype are `scenes`, of which those that are not needed are left out,
