@@ -155,15 +155,15 @@ class PrimaryChains {
 
   /// The target at as many samples of each length.
   std::vector<double> bootstrap() const {
-    constexpr std::size_t kSamplesATask = 256;
+    constexpr std::size_t kSamplesPerTask = 256;
     const std::size_t lengths = bootstrap_weights_.size();
     const auto wanted = static_cast<std::size_t>(options_.bootstrap);
     std::vector<double> values((wanted + lengths - 1) / lengths * lengths);
-    tbb::parallel_for(std::size_t{0}, (values.size() + kSamplesATask - 1) / kSamplesATask,
+    tbb::parallel_for(std::size_t{0}, (values.size() + kSamplesPerTask - 1) / kSamplesPerTask,
                       [&](std::size_t task) {
                         Sampler sampler = sampler_;
-                        for (std::size_t i = task * kSamplesATask;
-                             i < std::min((task + 1) * kSamplesATask, values.size()); ++i) {
+                        for (std::size_t i = task * kSamplesPerTask;
+                             i < std::min((task + 1) * kSamplesPerTask, values.size()); ++i) {
                           auto at = point(i);
                           values[i] = sampler.target(at);
                         }

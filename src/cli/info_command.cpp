@@ -12,7 +12,6 @@
 #include <variant>
 #include <vector>
 
-#include "bsdf_textures.h"
 #include "cli/commands.h"
 #include "cli/max_depth.h"
 #include "cli/print.h"
@@ -72,9 +71,7 @@ std::string list_textures(const Scene& scene) {
     if (bitmap != nullptr && seen.insert(bitmap).second)
       sizes.push_back(fmt::format("{} x {}", bitmap->width, bitmap->height));
   };
-  for (const Bsdf& bsdf : scene.bsdfs()) for_each_texture(bsdf, add);
-  for (const Material& material : scene.materials())
-    if (material.relief != nullptr) add(material.relief->texture);
+  for_each_texture(scene, add);
   const std::string others = list(patterns, kPatterns);
   if (sizes.empty()) return others;
   const std::string bitmaps = fmt::format("{} bitmap ({})", sizes.size(), fmt::join(sizes, ", "));

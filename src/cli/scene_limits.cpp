@@ -5,8 +5,6 @@
 #include <set>
 #include <variant>
 
-#include "bsdf_textures.h"
-
 namespace driftlight::cli {
 namespace {
 
@@ -38,15 +36,9 @@ std::size_t memory_of(const Scene& scene) {
       sum +=
           bytes(mesh->positions) + bytes(mesh->normals) + bytes(mesh->uvs) + bytes(mesh->triangles);
   std::set<const Bitmap*> bitmaps;
-  const auto add = [&](const Texture& texture) { bitmaps.insert(texture.bitmap.get()); };
-  for (const Bsdf& bsdf : scene.bsdfs()) for_each_texture(bsdf, add);
-  for (const Material& material : scene.materials())
-    if (material.relief != nullptr) add(material.relief->texture);
-  for (const Emitter& emitter : scene.emitters()) {
+  for_each_texture(scene, [&](const Texture& texture) { bitmaps.insert(texture.bitmap.get()); });
+  for (const Emitter& emitter : scene.emitters())
     if (const auto* map = std::get_if<EnvironmentMap>(&emitter)) bitmaps.insert(&map->bitmap());
-    const auto* area = std::get_if<AreaEmitter>(&emitter);
-    if (area != nullptr && area->texture != nullptr) add(*area->texture);
-  }
   for (const Bitmap* bitmap : bitmaps)
     if (bitmap != nullptr) sum += bytes(bitmap->texels);
   return sum;

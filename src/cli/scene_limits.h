@@ -6,9 +6,22 @@
 #include <string>
 #include <vector>
 
+#include "bsdf_textures.h"
 #include "driftlight/scene.h"
 
 namespace driftlight::cli {
+
+/// Calls `visit` with each texture of surfaces and of their emission.
+template <class Visit>
+void for_each_texture(const Scene& scene, const Visit& visit) {
+  for (const Bsdf& bsdf : scene.bsdfs()) driftlight::for_each_texture(bsdf, visit);
+  for (const Material& material : scene.materials())
+    if (material.relief != nullptr) visit(material.relief->texture);
+  for (const Emitter& emitter : scene.emitters()) {
+    const auto* area = std::get_if<AreaEmitter>(&emitter);
+    if (area != nullptr && area->texture != nullptr) visit(*area->texture);
+  }
+}
 
 /// Bytes of meshes and bitmaps, without Embree's trees.
 std::size_t memory_of(const Scene& scene);
