@@ -97,6 +97,20 @@ int lobe_count(const Bsdf& bsdf) {
   return has_two ? 2 : 1;
 }
 
+bool is_isotropic(const Bsdf& bsdf) {
+  if (const auto* blend = std::get_if<Blend>(&bsdf))
+    return is_isotropic(blend->first->bsdf) && is_isotropic(blend->second->bsdf);
+  if (const auto* mask = std::get_if<Mask>(&bsdf))
+    return mask->nested == nullptr || is_isotropic(mask->nested->bsdf);
+  if (const auto* coating = std::get_if<Coating>(&bsdf)) return is_isotropic(coating->nested->bsdf);
+  if (const auto* metal = std::get_if<RoughConductor>(&bsdf))
+    return metal->microfacets.is_isotropic();
+  if (const auto* glass = std::get_if<RoughDielectric>(&bsdf))
+    return glass->microfacets.is_isotropic();
+  const auto* ward = std::get_if<Ward>(&bsdf);
+  return ward == nullptr || ward->microfacets().is_isotropic();
+}
+
 double delta_eta(const Bsdf& bsdf) {
   if (const auto* blend = std::get_if<Blend>(&bsdf)) {
     const bool of_first = has_delta(blend->first->bsdf, Scattering::Transmission);

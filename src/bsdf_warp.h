@@ -77,19 +77,24 @@ template <Scalar T>
 Warped<T> warp_bsdf(const RoughConductor& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
                     const Vec3<T>& u) {
   if (value(at.n).dot(value(wi)) <= 0.0) return std::nullopt;
-  const Vec3<T> h = to_world<T>(b.microfacets.sample<T>(to_local<T>(wi, at.n), u.x(), u.y()), at.n);
+  const Vec3<T> h = b.microfacets.sample<T>(at, wi, u.x(), u.y());
   return reflected<T>(reflect(wi, h), wi, at.n);
 }
 
 /// p(wo) = p(h) / (4 wi.h)
 template <Scalar T>
+T mirrored_pdf(const Microfacets& m, const SurfacePoint<T>& at, const Vec3<T>& wi,
+               const Vec3<T>& wo) {
+  const Vec3<T> h = unit<T>(wi + wo);
+  return m.pdf<T>(at, wi, h) / (4.0 * dot(wi, h));
+}
+
+template <Scalar T>
 T pdf_bsdf(const RoughConductor& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
            const Vec3<T>& wo) {
-  const T cos_i = dot(at.n, wi);
-  if (value(cos_i) <= 0.0 || value(at.n).dot(value(wo)) <= 0.0) return constant<T>(0.0);
-  const Vec3<T> h = unit<T>(wi + wo);
-  const T ih = dot(wi, h);
-  return b.microfacets.pdf<T>(cos_i, dot(at.n, h), ih) / (4.0 * ih);
+  if (value(at.n).dot(value(wi)) <= 0.0 || value(at.n).dot(value(wo)) <= 0.0)
+    return constant<T>(0.0);
+  return mirrored_pdf<T>(b.microfacets, at, wi, wo);
 }
 
 template <Scalar T>
@@ -115,7 +120,7 @@ Warped<T> warp_bsdf(const RoughDielectric& b, const SurfacePoint<T>& at, const V
   if (cos_i == 0.0) return std::nullopt;
   const Vec3<T> n = cos_i > 0.0 ? at.n : Vec3<T>(-at.n);
   const double eta = cos_i > 0.0 ? b.eta : 1.0 / b.eta;
-  const Vec3<T> h = to_world<T>(b.microfacets.sample<T>(to_local<T>(wi, n), u.x(), u.y()), n);
+  const Vec3<T> h = b.microfacets.sample<T>({n, at.uv, at.tangent}, wi, u.x(), u.y());
   const double ih = value(wi).dot(value(h));
   if (ih <= 0.0) return std::nullopt;
   if (value(u.z()) < fresnel_dielectric(ih, eta)) return reflected<T>(reflect(wi, h), wi, n);
@@ -130,17 +135,17 @@ T pdf_bsdf(const RoughDielectric& b, const SurfacePoint<T>& at, const Vec3<T>& w
            const Vec3<T>& wo) {
   using std::abs;
   const double side = value(at.n).dot(value(wi)) > 0.0 ? 1.0 : -1.0;
-  const T cos_i = side * dot(at.n, wi);
-  const double cos_o = side * value(at.n).dot(value(wo));
-  if (value(cos_i) == 0.0 || cos_o == 0.0) return constant<T>(0.0);
+  const Vec3<T> n = constant<T>(side) * at.n;
+  const double cos_o = value(n).dot(value(wo));
+  if (value(n).dot(value(wi)) == 0.0 || cos_o == 0.0) return constant<T>(0.0);
   const double eta = side > 0.0 ? b.eta : 1.0 / b.eta;
   const double e = cos_o > 0.0 ? 1.0 : eta;
   Vec3<T> h = unit<T>(wi + constant<T>(e) * wo);
-  if (value(at.n).dot(value(h)) * side < 0.0) h = -h;
+  if (value(n).dot(value(h)) < 0.0) h = -h;
   const T ih = dot(wi, h);
   const T oh = dot(wo, h);
   if (value(ih) <= 0.0 || value(oh) * cos_o <= 0.0) return constant<T>(0.0);
-  const T p = b.microfacets.pdf<T>(cos_i, side * dot(at.n, h), ih);
+  const T p = b.microfacets.pdf<T>({n, at.uv, at.tangent}, wi, h);
   const T fresnel = fresnel_dielectric(ih, eta);
   if (cos_o > 0.0) return p * fresnel / (4.0 * ih);
   const T denominator = ih + e * oh;
@@ -197,8 +202,8 @@ Warped<T> warp_bsdf(const Ward& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
   const Vec2d uv{value(at.uv.x()), value(at.uv.y())};
   if (!(value(u.z()) < specular_probability(b, uv)))
     return reflected<T>(warp_diffuse(at.n, u), wi, at.n);
-  const Vec3<T> local = b.microfacets().sample<T>(to_local<T>(wi, at.n), u.x(), u.y());
-  return reflected<T>(reflect(wi, to_world<T>(local, at.n)), wi, at.n);
+  const Vec3<T> h = b.microfacets().sample<T>(at, wi, u.x(), u.y());
+  return reflected<T>(reflect(wi, h), wi, at.n);
 }
 
 template <Scalar T>
@@ -207,10 +212,7 @@ T pdf_bsdf(const Ward& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const Ve
   const T cos_o = dot(at.n, wo);
   if (value(cos_i) <= 0.0 || value(cos_o) <= 0.0) return constant<T>(0.0);
   const T s = specular_probability(b, at.uv);
-  const Vec3<T> h = unit<T>(wi + wo);
-  const T ih = dot(wi, h);
-  return s * b.microfacets().pdf<T>(cos_i, dot(at.n, h), ih) / (4.0 * ih) +
-         (1.0 - s) * cos_o * kInvPi;
+  return s * mirrored_pdf<T>(b.microfacets(), at, wi, wo) + (1.0 - s) * cos_o * kInvPi;
 }
 
 /// With which the coat is taken: in proportion to F and T, and to what coat and base reflect.
@@ -264,7 +266,7 @@ Warped<T> warp_bsdf(const RoughPlastic& b, const SurfacePoint<T>& at, const Vec3
   const double cos_i = value(at.n).dot(value(wi));
   if (cos_i <= 0.0) return std::nullopt;
   if (!takes_coat(b, at, cos_i, u.z())) return reflected<T>(warp_diffuse(at.n, u), wi, at.n);
-  const Vec3<T> h = to_world<T>(b.microfacets.sample<T>(to_local<T>(wi, at.n), u.x(), u.y()), at.n);
+  const Vec3<T> h = b.microfacets.sample<T>(at, wi, u.x(), u.y());
   return reflected<T>(reflect(wi, h), wi, at.n);
 }
 
@@ -274,10 +276,7 @@ T pdf_bsdf(const RoughPlastic& b, const SurfacePoint<T>& at, const Vec3<T>& wi, 
   const T cos_o = dot(at.n, wo);
   if (value(cos_i) <= 0.0 || value(cos_o) <= 0.0) return constant<T>(0.0);
   const T coat = coat_probability<T>(b, cos_i, at.uv);
-  const Vec3<T> h = unit<T>(wi + wo);
-  const T ih = dot(wi, h);
-  return coat * b.microfacets.pdf<T>(cos_i, dot(at.n, h), ih) / (4.0 * ih) +
-         (1.0 - coat) * cos_o * kInvPi;
+  return coat * mirrored_pdf<T>(b.microfacets, at, wi, wo) + (1.0 - coat) * cos_o * kInvPi;
 }
 
 /// F of one face; the pane reflects 2 F / (1 + F), with all that goes to and fro within.

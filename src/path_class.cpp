@@ -9,7 +9,10 @@ namespace driftlight {
 namespace {
 
 std::string name(const Microfacets& microfacets) {
-  return microfacets.distribution == Distribution::Ggx ? "ggx" : "beckmann";
+  const std::string distribution = microfacets.distribution == Distribution::Beckmann ? "beckmann"
+                                   : microfacets.distribution == Distribution::Ggx    ? "ggx"
+                                                                                      : "phong";
+  return microfacets.is_isotropic() ? distribution : "anisotropic " + distribution;
 }
 
 struct BsdfKind {
@@ -23,7 +26,9 @@ struct BsdfKind {
     return "rough dielectric " + name(b.microfacets);
   }
   std::string operator()(const Phong&) const { return "phong"; }
-  std::string operator()(const Ward&) const { return "ward"; }
+  std::string operator()(const Ward& b) const {
+    return b.microfacets().is_isotropic() ? "ward" : "anisotropic ward";
+  }
   std::string operator()(const Plastic&) const { return "plastic"; }
   std::string operator()(const RoughPlastic& b) const {
     return "rough plastic " + name(b.microfacets);
@@ -47,8 +52,7 @@ std::string passage(const ScatterEvent<double>& e) {
 /// Which of two lobes is the brighter one.
 template <class B>
 bool is_glossy(const B& b, const ScatterEvent<double>& e) {
-  const Vec3d& n = e.at.n_s;
-  const auto lobes = detail::lobes<double>(b, n.dot(e.wi), n.dot(e.wo), e.wi.dot(e.wo), e.at.uv);
+  const auto lobes = detail::lobes<double>(b, e.surface(), e.wi, e.wo);
   return lobes.glossy > lobes.diffuse;
 }
 

@@ -15,7 +15,7 @@ struct SurfaceHit {
   bool front;        ///< wi is on the side of the shape's outward normal
   const Bsdf* bsdf;  ///< null on the black back side of an opaque surface
 
-  SurfacePoint<double> surface() const { return {at.n_s, at.uv}; }
+  SurfacePoint<double> surface() const { return at.surface(); }
   Scattering side(const Vec3d& wo) const {
     return at.n_g.dot(wi) * at.n_g.dot(wo) > 0.0 ? Scattering::Reflection
                                                  : Scattering::Transmission;

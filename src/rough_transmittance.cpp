@@ -13,20 +13,22 @@ namespace {
 /// int F D G / (4 cos_i) d omega_o, over facets: F G cos_ih / (cos_i cos_h) of D cos_h, which is
 /// sampled at the midpoints of a grid of its random numbers.
 double reflectance(const Microfacets& m, double eta, double cos_i) {
+  const SurfacePoint<double> at{Vec3d::UnitZ(), Vec2d::Zero(), Vec3d::Zero()};
   constexpr int kPolar = 48;
   constexpr int kAround = 48;
   const Vec3d wi(std::sqrt(1.0 - cos_i * cos_i), 0.0, cos_i);
   double sum = 0.0;
   for (int i = 0; i < kPolar; ++i) {
     for (int j = 0; j < kAround; ++j) {
-      const Vec3d h = m.sample(wi, (i + 0.5) / kPolar, (j + 0.5) / kAround);
+      const Vec3d h = m.sample(at, wi, (i + 0.5) / kPolar, (j + 0.5) / kAround);
       const double ih = wi.dot(h);
       if (ih <= 0.0) continue;
-      const double cos_o = 2.0 * ih * h.z() - cos_i;
-      if (cos_o <= 0.0) continue;
-      const double d = std::exp(m.log_d(h.z() * h.z()));
-      const double g = m.g1(cos_i) * m.g1(cos_o);
-      sum += fresnel_dielectric(ih, eta) * d * g * ih / (cos_i * m.pdf(cos_i, h.z(), ih));
+      const Vec3d wo = reflect(wi, h);
+      if (wo.z() <= 0.0) continue;
+      const double cos_h2 = h.z() * h.z();
+      const double d = std::exp(m.log_d(cos_h2, m.steepness(at, h, cos_h2)));
+      const double g = m.g1(m.grazing(at, wi, cos_i)) * m.g1(m.grazing(at, wo, wo.z()));
+      sum += fresnel_dielectric(ih, eta) * d * g * ih / (cos_i * m.pdf(at, wi, h));
     }
   }
   return sum / (kPolar * kAround);

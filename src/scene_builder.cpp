@@ -128,6 +128,8 @@ Scene SceneBuilder::build() {
     shape.textured = shape.relief != nullptr ||
                      is_textured(scene.surfaces_->bsdfs.at(material.front)) ||
                      (material.back && is_textured(scene.surfaces_->bsdfs.at(*material.back)));
+    shape.anisotropic = !is_isotropic(scene.surfaces_->bsdfs.at(material.front)) ||
+                        (material.back && !is_isotropic(scene.surfaces_->bsdfs.at(*material.back)));
     if (shape.emitter) {
       const bool emits_texture =
           std::get<AreaEmitter>(scene.emitters_[*shape.emitter]).texture != nullptr;

@@ -58,9 +58,9 @@ std::vector<Named> scattering_bsdfs() {
   result.push_back(
       {"phong textured", Phong{bitmap_texture(0.1, 0.4), bitmap_texture(0.0, 0.6), 40}});
   const Texture low(Rgbd::Constant(0.2));
-  result.push_back({"ward", Ward{Ward::Variant::Ward, 0.3, half, low}});
-  result.push_back({"ward-duer", Ward{Ward::Variant::Duer, 0.3, half, low}});
-  result.push_back({"balanced ward 0.1", Ward{Ward::Variant::Balanced, 0.1,
+  result.push_back({"ward", Ward{Ward::Variant::Ward, 0.3, 0.3, half, low}});
+  result.push_back({"ward-duer", Ward{Ward::Variant::Duer, 0.3, 0.3, half, low}});
+  result.push_back({"balanced ward 0.1", Ward{Ward::Variant::Balanced, 0.1, 0.1,
                                               bitmap_texture(0.1, 0.4), bitmap_texture(0.1, 0.5)}});
   for (const bool nonlinear : {false, true})
     result.push_back(
@@ -74,6 +74,14 @@ std::vector<Named> scattering_bsdfs() {
       {"blend of rough glass, diffuse and metal",
        Blend{half, boxed(RoughDielectric{{Distribution::Ggx, 0.3}, 1.5, kWhite, kWhite}),
              boxed(Blend{weight, boxed(Diffuse{kWhite}), metal})}});
+  for (const auto distribution : {Distribution::Beckmann, Distribution::Ggx}) {
+    const Microfacets brushed{distribution, 0.4, 0.1};
+    result.push_back({"brushed conductor", RoughConductor{brushed}});
+    result.push_back(
+        {"brushed dielectric", RoughDielectric{{distribution, 0.15, 0.5}, 1.5, kWhite, kWhite}});
+  }
+  result.push_back({"brushed phong conductor", RoughConductor{{Distribution::Phong, 0.4, 0.1}}});
+  result.push_back({"brushed ward", Ward{Ward::Variant::Balanced, 0.1, 0.4, half, low}});
   return result;
 }
 
@@ -105,7 +113,8 @@ std::vector<Named> mixed_bsdfs() {
 }
 
 /// A surface point with a tilted normal, and directions from perpendicular to grazing.
-const SurfacePoint<double> kPoint{Vec3d(0.3, -0.5, 0.8).normalized(), Vec2d(0.37, 0.81)};
+const SurfacePoint<double> kPoint{Vec3d(0.3, -0.5, 0.8).normalized(), Vec2d(0.37, 0.81),
+                                  Vec3d(1.2, 0.5, -0.1)};
 
 std::vector<Vec3d> view_directions(bool both_sides) {
   std::vector<Vec3d> result;
@@ -290,7 +299,7 @@ TEST(Bsdf, PdfCoversEval) {
 // F G1(wo) for visible normals (GGX).
 TEST(Bsdf, EvalOverPdfInClosedForm) {
   Rng rng(67, Stream::Test, 0);
-  const Microfacets ggx{Distribution::Ggx, 0.3};
+  const Microfacets ggx{Distribution::Ggx, 0.3, 0.15};
   const Bsdf metal = RoughConductor{ggx, {0.2, 0.2, 0.2}, {3, 3, 3}};
   const Bsdf plaster = Diffuse{Texture(Rgbd::Constant(0.7))};
   for (const Vec3d& wi : view_directions(false)) {
@@ -302,7 +311,8 @@ TEST(Bsdf, EvalOverPdfInClosedForm) {
       const auto next = sample(metal, kPoint, wi, rng.uniform3());
       if (!next) continue;
       const double cos_ih = wi.dot((wi + next->wo).normalized());
-      const double expected = fresnel_conductor(cos_ih, 0.2, 3.0) * ggx.g1(kPoint.n.dot(next->wo));
+      const double grazing = ggx.grazing(kPoint, next->wo, kPoint.n.dot(next->wo));
+      const double expected = fresnel_conductor(cos_ih, 0.2, 3.0) * ggx.g1(grazing);
       EXPECT_NEAR(eval_luminance(metal, wi, next->wo) / pdf(metal, kPoint, wi, next->wo), expected,
                   1e-7 * expected);
     }

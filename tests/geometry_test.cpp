@@ -37,7 +37,7 @@ TEST(Interaction, Triangle) {
     if (flipped)
       for (auto& n : mesh.normals) n = -n;
     for (int i = 0; i < 500; ++i) {
-      const std::uint32_t triangle = i % 2;
+      const std::uint32_t triangle = i % 2 == 0 ? 0 : 1;
       const std::array<Vec3d, 3> corner = corners(mesh, triangle);
       double b1 = rng.uniform();
       double b2 = rng.uniform();
@@ -204,6 +204,41 @@ TEST(Interaction, JetsSeeTheSurface) {
       }
       for (int k = 0; k < 2; ++k)
         check_derivative(shape, 0, ray, shift, turn, [k](const auto& a) { return a.uv[k]; });
+    }
+  }
+}
+
+// Law: along the tangent u grows and v stays, on every shape that has texture coordinates.
+TEST(TangentField, LiesAlongGrowingU) {
+  Rng rng(127, Stream::Test, 0);
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(0.8, Vec3d(1, 2, -1).normalized()).toRotationMatrix();
+  const std::vector<Geometry> shapes{
+      round_mesh({0.3, -0.2, 0.1}, 1.0, 4), Sphere{{0.3, -0.2, 0.1}, 1.0, turn},
+      Disk{{0.2, 0.1, 0}, turn * Vec3d(1.5, 0.2, 0), turn * Vec3d(0.1, 1.1, 0)},
+      Cylinder{{0.2, -0.1, 0.3}, turn, 2.0, 0.7}};
+  for (const Geometry& shape : shapes) {
+    int tried = 0;
+    while (tried < 100) {
+      const auto* mesh = std::get_if<TriangleMesh>(&shape);
+      const auto primitive = static_cast<std::uint32_t>(
+          mesh != nullptr ? rng.uniform() * static_cast<double>(mesh->triangles.size()) : 0.0);
+      const Ray<double> ray = ray_to(0.5 * random_direction(rng), rng);
+      const Vec3d p = interact(shape, primitive, ray, false).p;
+      // What lies behind the origin would change sides.
+      if (!p.allFinite() || (p - ray.origin).dot(ray.direction) <= 0.0) continue;
+      ++tried;
+      const Vec3d tangent = tangent_field(shape, primitive).at(p);
+      // Near p the ray from the same origin through p + s tangent meets the surface there but for
+      // s^2.
+      const auto uv = [&](double s) {
+        const Vec3d toward = (p + s * tangent - ray.origin).normalized();
+        return interact(shape, primitive, Ray<double>{ray.origin, toward}, true).uv;
+      };
+      const Vec2d slope = (uv(1e-5) - uv(-1e-5)) / 2e-5;
+      if (std::abs(slope.x()) > 1e3) continue;  // across the seam of the azimuth
+      EXPECT_GT(slope.x(), 0.0);
+      EXPECT_NEAR(slope.y(), 0.0, 1e-5 * slope.x());
     }
   }
 }

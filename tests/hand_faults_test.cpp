@@ -24,6 +24,7 @@ struct Fault {
   std::function<void(const Bsdf&, Scattering, FactorPartials&)> delta;
   std::function<void(Scattering, HandRules::DeltaMap&)> delta_map;
   std::function<void(const Geometry&, SurfaceDifferential&)> surface;
+  std::function<Vec3d(const TangentField&, const Vec3d& p_bar)> tangent_adjoint;
   std::function<double(const Geometry&)> hit_cosine;  ///< a factor
   std::function<Vec3d(const Vec3d& v, const Vec3d& n, double cosine, const Vec3d& q)> hit_adjoint;
   std::function<Vec3d(const Camera&, const Vec3d& v)> camera;
@@ -37,11 +38,14 @@ struct Fault {
 struct FaultyRules : HandRules {
   static inline const Fault* fault = nullptr;
 
-  static FactorPartials scatter(const Bsdf& bsdf, double cos_i, double cos_o, double io,
-                                const Vec2d& uv, Scattering scattering) {
-    FactorPartials f = HandRules::scatter(bsdf, cos_i, cos_o, io, uv, scattering);
-    if (fault->scatter) fault->scatter(bsdf, scattering, cos_i > 0.0, f);
+  static FactorPartials scatter(const Bsdf& bsdf, const ScatterPoint& x) {
+    FactorPartials f = HandRules::scatter(bsdf, x);
+    if (fault->scatter) fault->scatter(bsdf, x.scattering, x.cos_i > 0.0, f);
     return f;
+  }
+  static Vec3d tangent_adjoint(const TangentField& field, const Vec3d& p_bar) {
+    return fault->tangent_adjoint ? fault->tangent_adjoint(field, p_bar)
+                                  : HandRules::tangent_adjoint(field, p_bar);
   }
   static FactorPartials delta(const Bsdf& bsdf, double cos_i, const Vec2d& uv,
                               Scattering scattering) {
@@ -167,6 +171,22 @@ std::vector<Fault> scatter_faults() {
                     [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
                       if (is<Ward>(b)) f.cos_i[1] *= 1.01;
                     }),
+      scatter_fault("anisotropic metal: one per mil along the tangent by wi",
+                    [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
+                      if (is<RoughConductor>(b)) f.tangent_i[3] *= 1.001;
+                    }),
+      scatter_fault("anisotropic glass: sign along the tangent by wo",
+                    [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
+                      if (is<RoughDielectric>(b)) f.tangent_o[3] *= -1.0;
+                    }),
+      scatter_fault("anisotropic Ward: factor by the tangent's normal part",
+                    [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
+                      if (is<Ward>(b)) f.tangent_n *= 1.01;
+                    }),
+      scatter_fault("coating: factor of the tangent by wi",
+                    [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
+                      if (is<Coating>(b)) f.tangent_i *= 1.01;
+                    }),
       scatter_fault("plastic: sign of the slope of T by cos_i",
                     [](const Bsdf& b, Scattering, bool, FactorPartials& f) {
                       if (is<Plastic>(b)) f.cos_i[3] *= -1.0;
@@ -244,7 +264,15 @@ std::vector<Fault> delta_faults() {
 }
 
 std::vector<Fault> geometry_faults() {
-  std::vector<Fault> faults(7);
+  std::vector<Fault> faults(9);
+  faults[7].name = "tangent of spheres: sign of its turn";
+  faults[7].tangent_adjoint = [](const TangentField& field, const Vec3d& p_bar) {
+    return Vec3d(field.turn.cross(p_bar) + field.spread * p_bar);
+  };
+  faults[8].name = "tangent of disks: factor of its spread";
+  faults[8].tangent_adjoint = [](const TangentField& field, const Vec3d& p_bar) {
+    return Vec3d(p_bar.cross(field.turn) + 1.01 * field.spread * p_bar);
+  };
   faults[0].name = "interpolated normal: sign along one edge";
   faults[0].surface = [](const Geometry&, SurfaceDifferential& d) {
     if (d.interpolated) d.a1 = Vec3d(-d.a1);

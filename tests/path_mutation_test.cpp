@@ -418,7 +418,7 @@ double balance_p_value(const TestScene& test, const Kind& kind, bool exchanged, 
   const double bound = 20.0 * paths.mean_weight();
   VertexPath x;
   VertexPath y;
-  for (std::uint64_t i = 0; i < 120000; ++i) {
+  for (std::uint64_t i = 0; i < 150000; ++i) {
     Rng rng(310, Stream::Test, i);
     if (!paths.draw(i, x, rng)) continue;
     const double w = paths.weight(x);

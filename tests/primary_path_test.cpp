@@ -223,8 +223,10 @@ TEST(BsdfWarp, LobesMagnifyByTheirDensity) {
                                 glass,
                                 phong,
                                 Phong{half, Texture(Rgbd::Zero()), 30}};
-  const SurfacePoint<double> at{Vec3d(0.3, -0.5, 0.8).normalized(), Vec2d(0.4, 0.3)};
-  const SurfacePoint<Jet2> at_jets{constant<Jet2>(at.n), constant<Jet2>(at.uv)};
+  const SurfacePoint<double> at{Vec3d(0.3, -0.5, 0.8).normalized(), Vec2d(0.4, 0.3),
+                                Vec3d(1.2, 0.5, -0.1)};
+  const SurfacePoint<Jet2> at_jets{constant<Jet2>(at.n), constant<Jet2>(at.uv),
+                                   constant<Jet2>(at.tangent)};
   Rng rng(14, Stream::Test, 0);
   std::array<int, 2> sides{};
   for (const Bsdf& bsdf : bsdfs) {

@@ -167,12 +167,15 @@ const Fault kPluginFaults[] = {
      R"(<bsdf type="dielectric">@<string name="intIOR" value="jelly"/></bsdf>)",
      {"'jelly'", "bk7", "diamond"}},
     {"Anisotropy",
-     R"(<bsdf type="roughconductor"><float name="alphaU" value="0.1"/>)"
+     R"(<bsdf type="roughplastic"><float name="alphaU" value="0.1"/>)"
      R"(@<float name="alphaV" value="0.2"/></bsdf>)",
      {"'alphaV'", "isotropic"}},
+    {"HalfAnisotropy",
+     R"(@<bsdf type="roughconductor"><float name="alphaU" value="0.1"/></bsdf>)",
+     {"'alphaU' and 'alphaV' need each other"}},
     {"UnknownDistribution",
-     R"(<bsdf type="roughconductor">@<string name="distribution" value="phong"/></bsdf>)",
-     {"'phong'", "beckmann, ggx"}},
+     R"(<bsdf type="roughconductor">@<string name="distribution" value="gauss"/></bsdf>)",
+     {"'gauss'", "beckmann, ggx, phong"}},
     {"EqualIndices",
      R"(@<bsdf type="roughdielectric"><float name="intIOR" value="2"/>)"
      R"(<float name="extIOR" value="2"/></bsdf>)",

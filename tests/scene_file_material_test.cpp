@@ -45,7 +45,7 @@ TEST(BsdfsXml, ReadsRoughConductors) {
          <rgb name="eta" value="0.2, 0.4, 1.4"/><rgb name="k" value="4, 2, 1.6"/>
          <float name="extEta" value="2"/><rgb name="specularReflectance" value="0.9"/></bsdf>)"));
   EXPECT_EQ(metal.microfacets.distribution, Distribution::Ggx);
-  EXPECT_EQ(metal.microfacets.alpha, 0.05);
+  EXPECT_EQ(metal.microfacets.alpha_u, 0.05);
   expect_near(metal.eta, Rgbd(0.1, 0.2, 0.7));
   expect_near(metal.k, Rgbd(2, 1, 0.8));
   expect_near(metal.specular_reflectance.color, Rgbd(0.9, 0.9, 0.9));
@@ -54,7 +54,7 @@ TEST(BsdfsXml, ReadsRoughConductors) {
 TEST(BsdfsXml, TheDefaultMetalIsCopperInAir) {
   const auto copper = std::get<RoughConductor>(load_bsdf(R"(<bsdf type="roughconductor"/>)"));
   EXPECT_EQ(copper.microfacets.distribution, Distribution::Beckmann);
-  EXPECT_EQ(copper.microfacets.alpha, 0.1);
+  EXPECT_EQ(copper.microfacets.alpha_v, 0.1);
   const auto named = std::get<Conductor>(
       load_bsdf(R"(<bsdf type="conductor"><string name="material" value="cu"/></bsdf>)"));
   expect_near(copper.eta, named.eta, 0.0);
@@ -95,22 +95,25 @@ TEST(BsdfsXml, ReadsDielectrics) {
 TEST(BsdfsXml, ReadsRoughDielectrics) {
   const auto glass = std::get<RoughDielectric>(load_bsdf(
       R"(<bsdf type="roughdielectric"><float name="alphaU" value="0.3"/>
-         <float name="alphaV" value="0.3"/></bsdf>)"));
-  EXPECT_EQ(glass.microfacets.alpha, 0.3);
+         <float name="alphaV" value="0.2"/></bsdf>)"));
+  EXPECT_EQ(glass.microfacets.alpha_u, 0.3);
+  EXPECT_EQ(glass.microfacets.alpha_v, 0.2);
   EXPECT_NEAR(glass.eta, 1.5046 / kAir, 1e-12);
 }
 
 TEST(BsdfsXml, ReadsWard) {
   const auto plain = std::get<Ward>(load_bsdf("<bsdf type=\"ward\"/>"));
   EXPECT_EQ(plain.variant, Ward::Variant::Balanced);
-  EXPECT_EQ(plain.alpha, 0.1);
+  EXPECT_EQ(plain.alpha_u, 0.1);
+  EXPECT_EQ(plain.alpha_v, 0.1);
   expect_near(plain.diffuse_reflectance.color, Rgbd(0.5, 0.5, 0.5));
   expect_near(plain.specular_reflectance.color, Rgbd(0.2, 0.2, 0.2));
   const auto rough =
       std::get<Ward>(load_bsdf(R"(<bsdf type="ward"><string name="variant" value="ward-duer"/>
-                   <float name="alphaU" value="0.3"/><float name="alphaV" value="0.3"/></bsdf>)"));
+                   <float name="alphaU" value="0.3"/></bsdf>)"));
   EXPECT_EQ(rough.variant, Ward::Variant::Duer);
-  EXPECT_EQ(rough.alpha, 0.3);
+  EXPECT_EQ(rough.alpha_u, 0.3);
+  EXPECT_EQ(rough.alpha_v, 0.1);
 }
 
 TEST(BsdfsXml, ReadsCoatings) {
@@ -150,7 +153,7 @@ TEST(BsdfsXml, ReadsPlastics) {
          <string name="distribution" value="ggx"/><float name="intIOR" value="1.9"/>
          <boolean name="nonlinear" value="true"/>
          <rgb name="diffuseReflectance" value="0.1, 0.2, 0.3"/></bsdf>)"));
-  EXPECT_EQ(rough.microfacets.alpha, 0.2);
+  EXPECT_EQ(rough.microfacets.alpha_u, 0.2);
   EXPECT_EQ(rough.microfacets.distribution, Distribution::Ggx);
   EXPECT_NEAR(rough.eta, 1.9 / kAir, 1e-12);
   EXPECT_TRUE(rough.base.nonlinear);

@@ -3,8 +3,7 @@
 ///
 /// Conventions: wi points toward the previous vertex (the sensor's side), wo toward the next, both
 /// unit and leaving the surface; n is the unit shading normal. Radiance flows from wo to wi.
-/// `eval` includes |n . wo|. All BSDFs here are isotropic, so the normal is all the frame they
-/// need.
+/// `eval` includes |n . wo|. Isotropic BSDFs need no more of a frame than the normal.
 #pragma once
 
 #include <optional>

@@ -19,13 +19,6 @@ struct ScaledColor {
   static ScaledColor zero() { return {constant<T>(0.0), constant<T>(Rgbd{0, 0, 0})}; }
 };
 
-/// What a BSDF needs to know of its surface point.
-template <Scalar T>
-struct SurfacePoint {
-  Vec3<T> n;
-  Vec2<T> uv;
-};
-
 /// f_s(wi, wo) |n . wo| of the BSDF's density, without its delta lobes.
 /// Radiance is transported: transmission carries the factor (eta_i / eta_t)^2.
 template <Scalar T>
@@ -35,6 +28,21 @@ ScaledColor<T> eval(const Bsdf& bsdf, const SurfacePoint<T>& at, const Vec3<T>& 
 // ---------------------------------------------------------------------------------------------
 
 namespace detail {
+
+/// Smith's G, separable.
+template <Scalar T>
+T shadowing(const Microfacets& m, const SurfacePoint<T>& at, const Vec3<T>& wi, const T& cos_i,
+            const Vec3<T>& wo, const T& cos_o) {
+  return m.g1(m.grazing(at, wi, cos_i)) * m.g1(m.grazing(at, wo, cos_o));
+}
+
+/// log D of h = wi + e wo, from the square of its cosine.
+template <Scalar T>
+T log_facets(const Microfacets& m, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& wo,
+             double e, const T& cos_h2) {
+  const Vec3<T> h = {wi.x() + e * wo.x(), wi.y() + e * wo.y(), wi.z() + e * wo.z()};
+  return m.log_d(cos_h2, m.steepness(at, h, cos_h2));
+}
 
 /// F D G / (4 cos_i): |h| of h = wi + wo gives cos(wi, h) = |h| / 2 and cos(n, h) = n.h / |h|.
 template <Scalar T>
@@ -48,9 +56,10 @@ ScaledColor<T> eval_bsdf(const RoughConductor& b, const SurfacePoint<T>& at, con
   const T h2 = 2.0 + 2.0 * dot(wi, wo);
   const T cos_h2 = sqr(cos_i + cos_o) / h2;
   const Microfacets& m = b.microfacets;
-  const T g = m.g1(cos_i) * m.g1(cos_o);
+  const T g = shadowing(m, at, wi, cos_i, wo, cos_o);
   const Rgb<T> fresnel = fresnel_conductor(T(0.5 * sqrt(h2)), b.eta, b.k);
-  return {m.log_d(cos_h2) + log(g / (4.0 * cos_i)), fresnel * b.specular_reflectance.eval(at.uv)};
+  return {log_facets(m, at, wi, wo, 1.0, cos_h2) + log(g / (4.0 * cos_i)),
+          fresnel * b.specular_reflectance.eval(at.uv)};
 }
 
 template <Scalar T>
@@ -101,10 +110,10 @@ ScaledColor<T> eval_bsdf(const RoughDielectric& b, const SurfacePoint<T>& at, co
   if (value(ih) * h_side * value(cos_i) <= 0.0 || value(oh) * h_side * value(cos_o) <= 0.0)
     return ScaledColor<T>::zero();
   const Microfacets& m = b.microfacets;
-  const T g = m.g1(cos_i) * m.g1(cos_o);
+  const T g = shadowing(m, at, wi, cos_i, wo, cos_o);
   // Not a quotient: that of Jets is rounded in another way, which total reflection amplifies.
   const T fresnel = fresnel_dielectric(T(abs(ih) * (1.0 / sqrt(h2))), eta);
-  const T log_dg = m.log_d(cos_h2) + log(g / abs(cos_i));
+  const T log_dg = log_facets(m, at, wi, wo, e, cos_h2) + log(g / abs(cos_i));
   if (reflection) {
     return {log_dg + log(0.25 * fresnel), b.specular_reflectance.eval(at.uv)};
   }
@@ -122,14 +131,16 @@ T phong_lobe(const Phong& b, const T& cos_mirror) {
   return (b.exponent + 2.0) * (0.5 * kInvPi) * exp(b.exponent * log(cos_mirror));
 }
 
-/// E of Ward, by D = exp(-t) / (pi alpha^2 C^2), C = cos^2(h, n) = (cos_i + cos_o)^2 / h.h.
+/// E of Ward, by D = exp(-t) / (pi alpha_u alpha_v C^2), C = cos^2(h, n) = (cos_i + cos_o)^2 / h.h.
 template <Scalar T>
-T ward_lobe(const Ward& b, const T& cos_i, const T& cos_o, const T& io) {
+T ward_lobe(const Ward& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& wo) {
   using std::exp;
   using std::sqrt;
-  const T h2 = 2.0 + 2.0 * io;
+  const T cos_i = dot(at.n, wi);
+  const T cos_o = dot(at.n, wo);
+  const T h2 = 2.0 + 2.0 * dot(wi, wo);
   const T cos_h2 = sqr(cos_i + cos_o) / h2;
-  const T d = exp(b.microfacets().log_d(cos_h2));
+  const T d = exp(log_facets(b.microfacets(), at, wi, wo, 1.0, cos_h2));
   if (b.variant == Ward::Variant::Balanced) return d / h2;
   const T cosines = cos_i * cos_o;
   return 0.25 * d * sqr(cos_h2) / (b.variant == Ward::Variant::Ward ? T(sqrt(cosines)) : cosines);
@@ -162,8 +173,8 @@ ScaledColor<T> eval_bsdf(const Ward& b, const SurfacePoint<T>& at, const Vec3<T>
   const T cos_i = dot(at.n, wi);
   const T cos_o = dot(at.n, wo);
   if (value(cos_i) <= 0.0 || value(cos_o) <= 0.0) return ScaledColor<T>::zero();
-  const T lobe = ward_lobe(b, cos_i, cos_o, T(dot(wi, wo)));
-  return eval_gloss(b.specular_reflectance, lobe, b.diffuse_reflectance, cos_o, at.uv);
+  return eval_gloss(b.specular_reflectance, ward_lobe(b, at, wi, wo), b.diffuse_reflectance, cos_o,
+                    at.uv);
 }
 
 template <Scalar T>
@@ -191,16 +202,17 @@ struct RoughPlasticParts {
   T specular, diffuse;
 };
 template <Scalar T>
-RoughPlasticParts<T> rough_plastic_parts(const RoughPlastic& b, const T& cos_i, const T& cos_o,
-                                         const T& io) {
+RoughPlasticParts<T> rough_plastic_parts(const RoughPlastic& b, const SurfacePoint<T>& at,
+                                         const Vec3<T>& wi, const Vec3<T>& wo) {
   using std::exp;
-  using std::log;
   using std::sqrt;
-  const T h2 = 2.0 + 2.0 * io;
+  const T cos_i = dot(at.n, wi);
+  const T cos_o = dot(at.n, wo);
+  const T h2 = 2.0 + 2.0 * dot(wi, wo);
   const Microfacets& m = b.microfacets;
-  const T g = m.g1(cos_i) * m.g1(cos_o);
+  const T g = shadowing(m, at, wi, cos_i, wo, cos_o);
   const T fresnel = fresnel_dielectric(T(0.5 * sqrt(h2)), b.eta);
-  const T d = exp(m.log_d(T(sqr(cos_i + cos_o) / h2)));
+  const T d = exp(log_facets(m, at, wi, wo, 1.0, T(sqr(cos_i + cos_o) / h2)));
   const T t = b.transmittance.eval(cos_i) * b.transmittance.eval(cos_o);
   return {d * g * fresnel / (4.0 * cos_i), cos_o * t * (kInvPi * b.base.inverse_eta2)};
 }
@@ -208,10 +220,8 @@ RoughPlasticParts<T> rough_plastic_parts(const RoughPlastic& b, const T& cos_i, 
 template <Scalar T>
 ScaledColor<T> eval_bsdf(const RoughPlastic& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
                          const Vec3<T>& wo) {
-  const T cos_i = dot(at.n, wi);
-  const T cos_o = dot(at.n, wo);
-  if (value(cos_i) <= 0.0 || value(cos_o) <= 0.0) return ScaledColor<T>::zero();
-  const RoughPlasticParts<T> part = rough_plastic_parts(b, cos_i, cos_o, T(dot(wi, wo)));
+  if (value(dot(at.n, wi)) <= 0.0 || value(dot(at.n, wo)) <= 0.0) return ScaledColor<T>::zero();
+  const RoughPlasticParts<T> part = rough_plastic_parts(b, at, wi, wo);
   const Rgb<T> specular = b.specular_reflectance.eval(at.uv);
   const Rgb<T> diffuse = b.base.albedo(at.uv);
   Rgb<T> color;
@@ -228,21 +238,22 @@ struct Lobes {
   T glossy_share() const { return glossy / (glossy + diffuse); }
 };
 template <Scalar T>
-Lobes<T> lobes(const Phong& b, const T& cos_i, const T& cos_o, const T& io, const Vec2<T>& uv) {
-  return {luminance(b.specular_reflectance.eval(uv)) * phong_lobe(b, T(2.0 * cos_i * cos_o - io)),
-          luminance(b.diffuse_reflectance.eval(uv)) * kInvPi};
+Lobes<T> lobes(const Phong& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& wo) {
+  return {luminance(b.specular_reflectance.eval(at.uv)) *
+              phong_lobe(b, T(2.0 * dot(at.n, wi) * dot(at.n, wo) - dot(wi, wo))),
+          luminance(b.diffuse_reflectance.eval(at.uv)) * kInvPi};
 }
 template <Scalar T>
-Lobes<T> lobes(const Ward& b, const T& cos_i, const T& cos_o, const T& io, const Vec2<T>& uv) {
-  return {luminance(b.specular_reflectance.eval(uv)) * ward_lobe(b, cos_i, cos_o, io),
-          luminance(b.diffuse_reflectance.eval(uv)) * kInvPi};
+Lobes<T> lobes(const Ward& b, const SurfacePoint<T>& at, const Vec3<T>& wi, const Vec3<T>& wo) {
+  return {luminance(b.specular_reflectance.eval(at.uv)) * ward_lobe(b, at, wi, wo),
+          luminance(b.diffuse_reflectance.eval(at.uv)) * kInvPi};
 }
 template <Scalar T>
-Lobes<T> lobes(const RoughPlastic& b, const T& cos_i, const T& cos_o, const T& io,
-               const Vec2<T>& uv) {
-  const RoughPlasticParts<T> part = rough_plastic_parts(b, cos_i, cos_o, io);
-  return {luminance(b.specular_reflectance.eval(uv)) * part.specular,
-          luminance(b.base.albedo(uv)) * part.diffuse};
+Lobes<T> lobes(const RoughPlastic& b, const SurfacePoint<T>& at, const Vec3<T>& wi,
+               const Vec3<T>& wo) {
+  const RoughPlasticParts<T> part = rough_plastic_parts(b, at, wi, wo);
+  return {luminance(b.specular_reflectance.eval(at.uv)) * part.specular,
+          luminance(b.base.albedo(at.uv)) * part.diffuse};
 }
 
 template <Scalar T>

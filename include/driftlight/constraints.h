@@ -87,28 +87,38 @@ class ConstraintVisitor : public WalkVisitor<T> {
 
  private:
   static Vec3<S> stripped(const Vec3<T>& v) { return {strip(v.x()), strip(v.y()), strip(v.z())}; }
-  static Vec2<S> uv_of(const ScatterEvent<T>& e) {
-    return {strip(e.at.uv.x()), strip(e.at.uv.y())};
+  static SurfacePoint<S> surface_of(const ScatterEvent<T>& e) {
+    return {stripped(e.at.n_s), {strip(e.at.uv.x()), strip(e.at.uv.y())}, stripped(e.at.tangent)};
   }
 
   void add(const Vec3<T>& residual, const S& precision) {
     for (int i = 0; i < 3; ++i) sink_.add(residual[i], precision);
   }
 
-  /// Slopes of the half vector as a vector of the tangent plane, r = h / (h.n) - n, |r| = tan(h,
-  /// n): free of any choice of tangents. h = wi + e wo need not be normalised.
-  Vec3<T> slopes(const ScatterEvent<T>& e, double eta) const {
+  /// Slopes of the half vector h = wi + e wo, with sigma^2 of Microfacets::slope_variance. Of an
+  /// isotropic distribution as a vector of the tangent plane, r = h / (h.n) - n, |r| = tan(h, n):
+  /// free of any choice of tangents. Else along the tangent and across it.
+  void add_slopes(const Microfacets& m, const ScatterEvent<T>& e, double eta,
+                  const S& responsibility) {
     const Vec3<T>& n = e.at.n_s;
     const Vec3<T> h = {e.wi.x() + e.wo.x() * eta, e.wi.y() + e.wo.y() * eta,
                        e.wi.z() + e.wo.z() * eta};
     const T inverse = constant<T>(1.0) / dot(h, n);
-    return {h.x() * inverse - n.x(), h.y() * inverse - n.y(), h.z() * inverse - n.z()};
-  }
-
-  /// sigma^2 of Microfacets::slope_variance.
-  void add_slopes(const Microfacets& microfacets, const Vec3<T>& r, const S& responsibility) {
+    if (!m.is_isotropic()) {
+      const TangentBasisOf<T> axes = tangent_axes(e.surface());
+      const T r_u = dot(axes.t, h) * inverse;
+      const T r_v = dot(axes.b, h) * inverse;
+      const S u = strip(r_u) / m.alpha_u;
+      const S v = strip(r_v) / m.alpha_v;
+      const S t = u * u + v * v;
+      sink_.add(r_u, S(responsibility / m.slope_variance(m.alpha_u, t)));
+      sink_.add(r_v, S(responsibility / m.slope_variance(m.alpha_v, t)));
+      return;
+    }
+    const Vec3<T> r = {h.x() * inverse - n.x(), h.y() * inverse - n.y(), h.z() * inverse - n.z()};
     const Vec3<S> s = stripped(r);
-    add(r, responsibility / microfacets.slope_variance(dot(s, s)));
+    const S t = dot(s, s) * (1.0 / (m.alpha_u * m.alpha_u));
+    add(r, responsibility / m.slope_variance(m.alpha_u, t));
   }
 
   /// Tangential part of wo; U = -log cos has sigma = cos.
@@ -133,12 +143,12 @@ class ConstraintVisitor : public WalkVisitor<T> {
   void constrain(const Conductor&, const ScatterEvent<T>&, const S&) {}
   void constrain(const Dielectric&, const ScatterEvent<T>&, const S&) {}
   void constrain(const RoughConductor& b, const ScatterEvent<T>& e, const S& share) {
-    add_slopes(b.microfacets, slopes(e, 1.0), share);
+    add_slopes(b.microfacets, e, 1.0, share);
   }
   void constrain(const RoughDielectric& b, const ScatterEvent<T>& e, const S& share) {
     const bool outside = value(dot(e.at.n_s, e.wi)) > 0.0;
     const double eta = e.scattering == Scattering::Reflection ? 1.0 : outside ? b.eta : 1.0 / b.eta;
-    add_slopes(b.microfacets, slopes(e, eta), share);
+    add_slopes(b.microfacets, e, eta, share);
   }
 
   void constrain(const ThinDielectric&, const ScatterEvent<T>&, const S&) {}
@@ -149,10 +159,7 @@ class ConstraintVisitor : public WalkVisitor<T> {
   template <class B, class AddGlossy>
   void add_lobes(const B& b, const ScatterEvent<T>& e, const S& share,
                  const AddGlossy& add_glossy) {
-    const auto cosine = [](const Vec3<T>& x, const Vec3<T>& y) { return S(strip(dot(x, y))); };
-    const Vec3<T>& n = e.at.n_s;
-    const auto lobes =
-        detail::lobes<S>(b, cosine(n, e.wi), cosine(n, e.wo), cosine(e.wi, e.wo), uv_of(e));
+    const auto lobes = detail::lobes<S>(b, surface_of(e), stripped(e.wi), stripped(e.wo));
     if (!lobes.any()) return;
     const S glossy = lobes.glossy_share();
     if (value(glossy) > 0.0) add_glossy(S(share * glossy));
@@ -165,12 +172,10 @@ class ConstraintVisitor : public WalkVisitor<T> {
     });
   }
   void constrain(const Ward& b, const ScatterEvent<T>& e, const S& share) {
-    add_lobes(b, e, share,
-              [&](const S& weight) { add_slopes(b.microfacets(), slopes(e, 1.0), weight); });
+    add_lobes(b, e, share, [&](const S& weight) { add_slopes(b.microfacets(), e, 1.0, weight); });
   }
   void constrain(const RoughPlastic& b, const ScatterEvent<T>& e, const S& share) {
-    add_lobes(b, e, share,
-              [&](const S& weight) { add_slopes(b.microfacets, slopes(e, 1.0), weight); });
+    add_lobes(b, e, share, [&](const S& weight) { add_slopes(b.microfacets, e, 1.0, weight); });
   }
   void constrain(const Mask& b, const ScatterEvent<T>& e, const S& share) {
     if (b.nested != nullptr) constrain(b.nested->bsdf, e, share);
@@ -183,8 +188,7 @@ class ConstraintVisitor : public WalkVisitor<T> {
     constrain(b.nested->bsdf, {b.nested->bsdf, e.shape, e.at, wi, wo, e.scattering}, share);
   }
   void constrain(const Blend& b, const ScatterEvent<T>& e, const S& share) {
-    const auto of =
-        detail::blend_shares<S>(b, {stripped(e.at.n_s), uv_of(e)}, stripped(e.wi), stripped(e.wo));
+    const auto of = detail::blend_shares<S>(b, surface_of(e), stripped(e.wi), stripped(e.wo));
     if (value(of.first) > 0.0) constrain(b.first->bsdf, e, S(share * of.first));
     if (value(of.second) > 0.0) constrain(b.second->bsdf, e, S(share * of.second));
   }

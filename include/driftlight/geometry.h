@@ -8,10 +8,11 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <variant>
 #include <vector>
 
-#include "driftlight/frame.h"
+#include "driftlight/surface_point.h"
 
 namespace driftlight {
 
@@ -81,6 +82,10 @@ struct Interaction {
   Vec3<T> n_g;  ///< unit geometric normal, on the side of n_s
   Vec3<T> n_s;  ///< unit shading normal
   Vec2<T> uv;   ///< texture coordinates; zero if not asked for
+  /// Of `tangent_field`; zero if not asked for.
+  Vec3<T> tangent = constant<T>(Vec3d(Vec3d::Zero()));
+
+  SurfacePoint<T> surface() const { return {n_s, uv, tangent}; }
 };
 
 /// Corners of a triangle, in double.
@@ -98,6 +103,62 @@ inline Vec3d geometric_normal(const TriangleMesh& mesh, std::uint32_t triangle) 
   Vec3d shading = Vec3d::Zero();
   for (const std::uint32_t i : mesh.triangles[triangle]) shading += mesh.normals[i].cast<double>();
   return n.dot(shading) < 0.0 ? Vec3d(-n) : n;
+}
+
+/// dp/du and dp/dv over a triangle, in world space.
+struct SurfaceTangents {
+  Vec3d u, v;
+};
+
+/// None where the mesh has no texture coordinates, or these do not span the triangle.
+inline std::optional<SurfaceTangents> surface_tangents(const TriangleMesh& mesh,
+                                                       std::uint32_t triangle) {
+  if (mesh.uvs.empty()) return std::nullopt;
+  const auto& index = mesh.triangles[triangle];
+  const std::array<Vec3d, 3> p = corners(mesh, triangle);
+  const Vec2d u0 = mesh.uvs[index[0]].cast<double>();
+  const Vec2d u1 = mesh.uvs[index[1]].cast<double>() - u0;
+  const Vec2d u2 = mesh.uvs[index[2]].cast<double>() - u0;
+  const double area = u1.x() * u2.y() - u1.y() * u2.x();
+  if (area == 0.0) return std::nullopt;
+  const Vec3d e1 = (p[1] - p[0]) / area;
+  const Vec3d e2 = (p[2] - p[0]) / area;
+  return SurfaceTangents{u2.y() * e1 - u1.y() * e2, u1.x() * e2 - u2.x() * e1};
+}
+
+/// Vectors along dp/du at points p of a primitive, of any length: P = fixed + turn x p + spread p.
+/// So on all shapes: one vector of a triangle, about the axis of spheres and cylinders, and from
+/// the centre of disks. Where a triangle has no dp/du, its first edge.
+struct TangentField {
+  Vec3d fixed{0, 0, 0};
+  Vec3d turn{0, 0, 0};
+  double spread = 0;
+
+  template <Scalar T>
+  Vec3<T> at(const Vec3<T>& p) const {
+    return {turn.y() * p.z() - turn.z() * p.y() + spread * p.x() + fixed.x(),
+            turn.z() * p.x() - turn.x() * p.z() + spread * p.y() + fixed.y(),
+            turn.x() * p.y() - turn.y() * p.x() + spread * p.z() + fixed.z()};
+  }
+};
+inline TangentField tangent_field(const TriangleMesh& mesh, std::uint32_t triangle) {
+  if (const auto tangents = surface_tangents(mesh, triangle)) return {tangents->u};
+  const std::array<Vec3d, 3> p = corners(mesh, triangle);
+  return {p[1] - p[0]};
+}
+inline TangentField tangent_field(const Sphere& sphere, std::uint32_t) {
+  const Vec3d axis = sphere.to_local.row(2);
+  return {sphere.center.cross(axis), axis};
+}
+inline TangentField tangent_field(const Cylinder& cylinder, std::uint32_t) {
+  const Vec3d axis = cylinder.axis();
+  return {cylinder.base.cross(axis), axis};
+}
+inline TangentField tangent_field(const Disk& disk, std::uint32_t) {
+  return {-disk.center, Vec3d::Zero(), 1.0};
+}
+inline TangentField tangent_field(const Geometry& geometry, std::uint32_t primitive) {
+  return std::visit([&](const auto& shape) { return tangent_field(shape, primitive); }, geometry);
 }
 
 /// Unit shading normal of a triangle at a point of its plane.

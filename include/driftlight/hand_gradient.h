@@ -5,9 +5,12 @@
 /// that leaves vertex k, and the partials f_. of its factor (H1), going backward:
 ///   v_bar += f_o n + f_m w_i;   block b of the gradient is -(t.v_bar, b.v_bar)           free
 ///   n_bar  = f_i w_i + f_o w_o,   w_bar = f_i n + f_m w_o
+///   v_bar += f_po P;   n_bar += f_pn P,   w_bar += f_pi P                     anisotropic
+///   P_bar  = f_pi w_i + f_po w_o + f_pn n + 2 f_p2 P
 ///   n_bar += p v_bar + q (n.v_bar) w_i,   w_bar += q (n.v_bar) n + r v_bar               delta
 ///                                                      (p, q, r) of HandRules::DeltaMap
-///   x_bar  = (I - n v^T / n.v) (x_bar + (dn/dx)^T n_bar + (duv/dx)^T uv_bar)       (H14)
+///   x_bar  = (I - n v^T / n.v) (x_bar + (dn/dx)^T n_bar + (duv/dx)^T uv_bar + (dP/dx)^T P_bar)
+///                                                                                        (H14)
 ///   transposed v_bar  = t x_bar - w_bar,   w_i = -v
 ///
 /// With a light side the joining edge e = y - x comes first. Its direction w = w_o at x = x_(t-1)
@@ -150,9 +153,10 @@ class GradientSweep : RecordedPath<Rules> {
     return e_bar;
   }
 
-  /// Derivatives of log f by the normal and the two directions of a vertex.
+  /// Derivatives of log f by the normal and the two directions of a vertex, and by P.
   struct Adjoint {
     Vec3d n, wi, wo;
+    Vec3d tangent = Vec3d::Zero();
   };
 
   /// By the vertex's own factor; that of a delta lobe knows no w_o.
@@ -161,7 +165,16 @@ class GradientSweep : RecordedPath<Rules> {
     const double f_i = fold(f.cos_i);
     const double f_o = x.delta ? 0.0 : fold(f.cos_o);
     const double f_m = x.delta ? 0.0 : fold(f.io);
-    return {f_i * x.wi + f_o * x.wo, f_i * x.n_s + f_m * x.wo, f_o * x.n_s + f_m * x.wi};
+    Adjoint a{f_i * x.wi + f_o * x.wo, f_i * x.n_s + f_m * x.wo, f_o * x.n_s + f_m * x.wi};
+    if (!x.shape->anisotropic || x.delta) return a;
+    const double by_wi = fold(f.tangent_i);
+    const double by_wo = fold(f.tangent_o);
+    const double by_n = fold(f.tangent_n);
+    a.n += by_n * x.tangent;
+    a.wi += by_wi * x.tangent;
+    a.wo += by_wo * x.tangent;
+    a.tangent = by_wi * x.wi + by_wo * x.wo + by_n * x.n_s + 2.0 * fold(f.tangent_2) * x.tangent;
+    return a;
   }
 
   /// Through the direction that a delta lobe determines.
@@ -177,6 +190,7 @@ class GradientSweep : RecordedPath<Rules> {
     const FactorPartials& f = x.factor;
     x_bar += x.surface.normal_adjoint(a.n);
     if (x.surface.textured) x_bar += fold(f.u) * x.surface.u + fold(f.v) * x.surface.v;
+    if (x.shape->anisotropic) x_bar += Rules::tangent_adjoint(x.field, a.tangent);
     x_bar = Rules::hit_adjoint(Vec3d(-x.wi), x.n_g, x.hit_cosine, x_bar);
     v_bar = x.length * x_bar - a.wi;
   }

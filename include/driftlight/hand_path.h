@@ -16,8 +16,10 @@ struct Vertex {
   const Shape* shape;
   Vec3d p, n_g, n_s, wi, wo;
   Vec2d uv;
-  double length;      ///< of the edge that arrives; negative where a displaced path runs backward
-  double hit_cosine;  ///< n_g . v of that edge
+  Vec3d tangent;
+  TangentField field;  ///< of the tangent; only if the shape is anisotropic
+  double length;       ///< of the edge that arrives; negative where a displaced path runs backward
+  double hit_cosine;   ///< n_g . v of that edge
   double cos_i, cos_o, io;
   Scattering scattering;
   bool delta;
@@ -65,7 +67,8 @@ struct Recorder : WalkVisitor<double> {
     Vertex& x = add(e, count, origin(count), false);
     ++count;
     if (!want_gradient) return;
-    x.factor = Rules::scatter(e.bsdf, x.cos_i, x.cos_o, x.io, e.at.uv, e.scattering);
+    x.factor =
+        Rules::scatter(e.bsdf, {e.surface(), e.wi, e.wo, x.cos_i, x.cos_o, x.io, e.scattering});
     color *= x.factor.color;
   }
   void connect(const ScatterEvent<double>& e) { scatter(e); }
@@ -115,12 +118,14 @@ struct Recorder : WalkVisitor<double> {
     color *= emitter.irradiance;
   }
   void vertex(int k) { index_ = k; }
-  /// f has its cosines the other way round.
+  /// f has its directions the other way round.
   void light_scatter(const ScatterEvent<double>& e) {
     Vertex& x = add_light(e, false);
     if (!want_gradient) return;
-    x.factor = Rules::scatter(e.bsdf, x.cos_o, x.cos_i, x.io, e.at.uv, e.scattering);
+    x.factor =
+        Rules::scatter(e.bsdf, {e.surface(), e.wi, e.wo, x.cos_o, x.cos_i, x.io, e.scattering});
     std::swap(x.factor.cos_i, x.factor.cos_o);
+    std::swap(x.factor.tangent_i, x.factor.tangent_o);
     color *= x.factor.color;
   }
   void light_connect(const ScatterEvent<double>& e) { light_scatter(e); }
@@ -152,6 +157,8 @@ struct Recorder : WalkVisitor<double> {
     x.wi = e.wi;
     x.wo = e.wo;
     x.uv = e.at.uv;
+    x.tangent = e.at.tangent;
+    if (e.shape.anisotropic) x.field = tangent_field(e.shape.geometry, primitive);
     x.length = (from - x.p).dot(x.wi);
     x.hit_cosine = Rules::hit_cosine(e.shape.geometry, from, Vec3d(-x.wi), x.n_g);
     x.cos_i = driftlight::dot(e.at.n_s, e.wi);

@@ -1,18 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Derivatives derived by hand: the rules of scattering by a density.
 ///
-/// All BSDFs are isotropic: with c_i = n.wi, c_o = n.wo, m = wi.wo,
-///   d log f_s = f_i dc_i + f_o dc_o + f_m dm + f_u du + f_v dv                           (H1)
+/// With c_i = n.wi, c_o = n.wo, m = wi.wo and, where the roughness is not isotropic, p_i = P.wi,
+/// p_o = P.wo, p_n = P.n, p_2 = P.P of the vector P along the tangent,
+///   d log f_s = f_i dc_i + f_o dc_o + f_m dm + f_u du + f_v dv
+///               + f_pi dp_i + f_po dp_o + f_pn dp_n + f_p2 dp_2                          (H1)
 ///   dc_i = wi.dn + n.dwi,  dc_o = wo.dn + n.dwo,  dm = wo.dwi + wi.dwo,
+///   dp_i = wi.dP + P.dwi,  dp_o = wo.dP + P.dwo,  dp_n = P.dn + n.dP,  dp_2 = 2 P.dP,
 /// and the partials f_. are:
 ///   diffuse          log c_o                                f_o = 1 / c_o                (H2)
-///   microfacets      log D(C), C = cos^2 h = (c_i + e c_o)^2 / h2, h2 = 1 + e^2 + 2 e m:
-///     dC = 2 (c_i + e c_o) / h2 (dc_i + e dc_o) - 2 e C / h2 dm                          (H3)
-///     Beckmann  d log D / dC = 1 / (alpha^2 C^2) - 2 / C
-///     GGX       d log D / dC = 2 (1 / alpha^2 - 1) / (C + (1 - C) / alpha^2)             (H4)
-///     Smith     with T = tan^2, dT/dc = -2 / c^3:
-///     GGX       d log G1 / dc = alpha^2 / (c^3 s (1 + s)),  s = sqrt(1 + alpha^2 T)
-///     Beckmann  d log G1 / dc = [num'(a) / num - den'(a) / den] a / (c (1 - c^2))        (H5)
+///   tangent slope    sigma of a direction w with c = n.w, p = P.w:  (p / c - p_n) / L,
+///     L^2 = p_2 - p_n^2:  dsigma = (dp / c - p / c^2 dc - dp_n) / L
+///                                  + sigma (p_n dp_n - dp_2 / 2) / L^2                   (H43)
+///   microfacets      log D(C, t), C = cos^2 h = (c_i + e c_o)^2 / h2, h2 = 1 + e^2 + 2 e m:
+///     dC = 2 (c_i + e c_o) / h2 (dc_i + e dc_o) - 2 e C / h2 dm
+///     dt = -dC / (alpha_v^2 C^2) + 2 (1 / alpha_u^2 - 1 / alpha_v^2) sigma_h dsigma_h    (H3)
+///     Beckmann  d log D = -dt - 2 dC / C
+///     GGX       d log D = -2 dt / (1 + t) - 2 dC / C                                     (H4)
+///     Phong     d log D = -g dt - t dg - dC / C,  g = log(1 + s) / s,  s = 1 / C - 1:
+///               dg = [log(1 + s) - s / (1 + s)] / s^2 dC / C^2                           (H46)
+///     Smith     dq = -2 alpha_v^2 / c^3 dc + 2 (alpha_u^2 - alpha_v^2) sigma dsigma:
+///     GGX       d log G1 = -dq / (2 s (1 + s)),  s = sqrt(1 + q)
+///     Beckmann  d log G1 = -[num'(a) / num - den'(a) / den] a / (2 q) dq,  a = 1 / sqrt q (H5)
 ///   rough metal      F(cos = sqrt(h2) / 2):  dF = F' dm / (2 sqrt(h2))                   (H6)
 ///   rough interface  F(|i| / sqrt(h2)), i = 1 + e m, o = m + e:
 ///     d(|i| / sqrt(h2)) = sign(i) e (1 - i / h2) / sqrt(h2) dm                           (H7)
@@ -23,20 +32,22 @@
 ///   Phong            log c_o + log(rho_d / pi + rho_s P(mu)), mu = 2 c_i c_o - m, P' = n P / mu
 ///                                                                                        (H11)
 ///   Ward             log c_o + log(rho_d / pi + rho_s E), with C and h2 as of microfacets:
-///     dlog E = (dlog D / dC + 2 / C) dC - k (dc_i / c_i + dc_o / c_o),  k = 1/2 (Ward), 1 (Duer)
-///     dlog E = dlog D / dC dC - 2 / h2 dm                               balanced         (H38)
+///     dlog E = dlog D + 2 dC / C - k (dc_i / c_i + dc_o / c_o),  k = 1/2 (Ward), 1 (Duer)
+///     dlog E = dlog D - 2 / h2 dm                                balanced               (H38)
 ///   plastic          log c_o + log T(c_i) T(c_o), T = 1 - F, T' = -F'                   (H29)
 ///   rough plastic    log(rho_s E + a B), E = F D G / (4 c_i) as rough metal, B = c_o T(c_i)
 ///   T(c_o):
 ///                    the partials of log E and log B by their shares                      (H30)
-///   coating          log T(c_i) T(c_o) c_o / c_o' - a (1/c_i' + 1/c_o') + log f'(c_i', c_o', m'),
+///   coating          log T(c_i) T(c_o) c_o / c_o' - a (1/c_i' + 1/c_o') + log f'(c_i', c_o', m',
+///                    p_i', p_o', p_n, p_2),
 ///     c' = sqrt(1 - (1 - c^2) / eta^2),  dc' = c / (eta^2 c') dc,
-///     m' = (m - c_i c_o) / eta^2 + c_i' c_o'                                            (H39)
+///     m' = (m - c_i c_o) / eta^2 + c_i' c_o',  p' = p / eta + (c' - c / eta) p_n         (H39)
 ///   blend            F = (1 - w) F_1 + w F_2:  dF = (1 - w) F_1 dlog F_1 + w F_2 dlog F_2
 ///                    + (F_2 - F_1) dw, of densities and of delta lobes                    (H34)
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "driftlight/bsdf.h"
@@ -54,34 +65,120 @@ struct FactorPartials {
   Lanes io = Lanes::Zero();
   Lanes u = Lanes::Zero();
   Lanes v = Lanes::Zero();
+  // Zero where the roughness is isotropic.
+  Lanes tangent_i = Lanes::Zero();  ///< by P.wi
+  Lanes tangent_o = Lanes::Zero();  ///< by P.wo
+  Lanes tangent_n = Lanes::Zero();  ///< by P.n
+  Lanes tangent_2 = Lanes::Zero();  ///< by P.P
+};
+/// Those by directions.
+inline constexpr std::array kDirectionPartials{
+    &FactorPartials::cos_i,     &FactorPartials::cos_o,     &FactorPartials::io,
+    &FactorPartials::tangent_i, &FactorPartials::tangent_o, &FactorPartials::tangent_n,
+    &FactorPartials::tangent_2};
+
+/// Scattering by a density, as f_s sees it: wi toward the sensor.
+struct ScatterPoint {
+  SurfacePoint<double> at;
+  Vec3d wi, wo;
+  double cos_i, cos_o, io;
+  Scattering scattering;
 };
 
-/// The rules (H2) to (H11), (H29), (H30), (H34), (H38), (H39).
+/// The rules (H2) to (H11), (H29), (H30), (H34), (H38), (H39), (H43), (H46).
 struct HandScatterRules {
   // ---- Microfacets ----
 
-  /// (H4)
-  static double d_log_d(const Microfacets& m, double cos2) {
-    const double inverse = 1.0 / (m.alpha * m.alpha);
-    if (m.distribution == Distribution::Beckmann) return inverse / (cos2 * cos2) - 2.0 / cos2;
-    return 2.0 * (inverse - 1.0) / (cos2 + (1.0 - cos2) * inverse);
+  /// (H43) of a direction with this cosine.
+  struct TangentSlope {
+    double value, by_projection, by_cosine, by_lift, by_square;
+  };
+  static TangentSlope tangent_slope(const SurfacePoint<double>& at, double projection,
+                                    double cosine) {
+    const double lift = at.tangent.dot(at.n);
+    const double length2 = at.tangent.squaredNorm() - lift * lift;
+    const double inverse = 1.0 / std::sqrt(length2);
+    const double slope = (projection / cosine - lift) * inverse;
+    return {slope, inverse / cosine, -projection * inverse / (cosine * cosine),
+            slope * lift / length2 - inverse, -0.5 * slope / length2};
   }
 
-  /// (H5); odd in the cosine, as log G1 is even.
-  static double d_log_g1(const Microfacets& m, double cosine) {
-    const double cos2 = cosine * cosine;
-    const double tan2 = (1.0 - cos2) / cos2;
-    const double alpha2 = m.alpha * m.alpha;
-    if (m.distribution == Distribution::Ggx) {
-      const double s = std::sqrt(1.0 + alpha2 * tan2);
-      return alpha2 / (cos2 * cosine * s * (1.0 + s));
+  /// dC of (H3), times this.
+  static void add_cos2(double factor, double e, const ScatterPoint& x, FactorPartials& f) {
+    const double h2 = 1.0 + e * e + 2.0 * e * x.io;
+    const double root = x.cos_i + e * x.cos_o;
+    f.cos_i[3] += factor * 2.0 * root / h2;
+    f.cos_o[3] += factor * 2.0 * root * e / h2;
+    f.io[3] -= factor * 2.0 * e * (root * root / h2) / h2;
+  }
+
+  /// dg / dC: (H46), near s = 0 by its series
+  static double d_phong_falloff(double cos2) {
+    const double s = (1.0 - cos2) / cos2;
+    const double slope = s < Microfacets::kSmallTan2 ? 1.0 / 2.0 - s * (2.0 / 3.0 - s * (3.0 / 4.0))
+                                                     : (std::log1p(s) - s / (1.0 + s)) / (s * s);
+    return slope / (cos2 * cos2);
+  }
+
+  /// d log D: (H3), (H4), (H46)
+  static void add_distribution(const Microfacets& m, double e, const ScatterPoint& x,
+                               FactorPartials& f) {
+    const double root = x.cos_i + e * x.cos_o;
+    const double cos2 = root * root / (1.0 + e * e + 2.0 * e * x.io);
+    const double k_u = 1.0 / (m.alpha_u * m.alpha_u);
+    const double k_v = 1.0 / (m.alpha_v * m.alpha_v);
+    double t = k_v * (1.0 - cos2) / cos2;
+    TangentSlope slope{};
+    if (!m.is_isotropic()) {
+      slope = tangent_slope(x.at, x.at.tangent.dot(x.wi + e * x.wo), root);
+      t += (k_u - k_v) * slope.value * slope.value;
     }
-    if (tan2 * alpha2 * 1.6 * 1.6 <= 1.0) return 0.0;
-    const double a = 1.0 / (m.alpha * std::sqrt(tan2));
+    double by_t = -1.0;
+    double by_cos2 = -2.0 / cos2;
+    if (m.distribution == Distribution::Ggx) {
+      by_t = -2.0 / (1.0 + t);
+    } else if (m.distribution == Distribution::Phong) {
+      by_t = -Microfacets::phong_falloff((1.0 - cos2) / cos2);
+      by_cos2 = -t * d_phong_falloff(cos2) - 1.0 / cos2;
+    }
+    add_cos2(by_cos2 - by_t * k_v / (cos2 * cos2), e, x, f);
+    if (m.is_isotropic()) return;
+    const double by_slope = by_t * 2.0 * (k_u - k_v) * slope.value;
+    f.cos_i[3] += by_slope * slope.by_cosine;
+    f.cos_o[3] += by_slope * slope.by_cosine * e;
+    f.tangent_i[3] += by_slope * slope.by_projection;
+    f.tangent_o[3] += by_slope * slope.by_projection * e;
+    f.tangent_n[3] += by_slope * slope.by_lift;
+    f.tangent_2[3] += by_slope * slope.by_square;
+  }
+
+  /// d log G1 by q: (H5)
+  static double d_log_g1(const Microfacets& m, double q) {
+    if (m.distribution == Distribution::Ggx) {
+      const double s = std::sqrt(1.0 + q);
+      return -0.5 / (s * (1.0 + s));
+    }
+    if (q * 1.6 * 1.6 <= 1.0) return 0.0;
+    const double a = 1.0 / std::sqrt(q);
     const double num = a * (3.535 + 2.181 * a);
     const double den = 1.0 + a * (2.276 + 2.577 * a);
     const double slope = (3.535 + 4.362 * a) / num - (2.276 + 5.154 * a) / den;
-    return slope * a / (cosine * (1.0 - cos2));
+    return -0.5 * slope * a / q;
+  }
+  /// d log G1 of w, whose cosine and projection these partials are by: (H5); odd in the cosine.
+  static void add_shadowing(const Microfacets& m, const SurfacePoint<double>& at, const Vec3d& w,
+                            double cosine, FactorPartials& f, FactorPartials::Lanes& by_cosine,
+                            FactorPartials::Lanes& by_projection) {
+    const double by_q = d_log_g1(m, m.grazing(at, w, cosine));
+    const double alpha2 = m.alpha_v * m.alpha_v;
+    by_cosine[3] += by_q * -2.0 * alpha2 / (cosine * cosine * cosine);
+    if (m.is_isotropic()) return;
+    const TangentSlope slope = tangent_slope(at, at.tangent.dot(w), cosine);
+    const double by_slope = by_q * 2.0 * (m.alpha_u * m.alpha_u - alpha2) * slope.value;
+    by_cosine[3] += by_slope * slope.by_cosine;
+    by_projection[3] += by_slope * slope.by_projection;
+    f.tangent_n[3] += by_slope * slope.by_lift;
+    f.tangent_2[3] += by_slope * slope.by_square;
   }
 
   // ---- Fresnel ----
@@ -158,126 +255,120 @@ struct HandScatterRules {
     f.v.head<3>() += log_slope(slopes.v, color);
   }
 
-  /// D and G: (H3) to (H5), into the lane of log_scale; e is 1 for reflection.
-  static void add_microfacets(const Microfacets& m, double e, double cos_i, double cos_o, double io,
+  /// D G / c_i: (H3) to (H5), into the lane of log_scale; e is 1 for reflection.
+  static void add_microfacets(const Microfacets& m, double e, const ScatterPoint& x,
                               FactorPartials& f) {
-    const double h2 = 1.0 + e * e + 2.0 * e * io;
-    const double root = cos_i + e * cos_o;
-    const double cos2 = root * root / h2;
-    const double d_cos2 = d_log_d(m, cos2);
-    f.cos_i[3] += d_cos2 * 2.0 * root / h2 + d_log_g1(m, cos_i) - 1.0 / cos_i;
-    f.cos_o[3] += d_cos2 * 2.0 * root * e / h2 + d_log_g1(m, cos_o);
-    f.io[3] -= d_cos2 * 2.0 * e * cos2 / h2;
+    add_distribution(m, e, x, f);
+    add_shadowing(m, x.at, x.wi, x.cos_i, f, f.cos_i, f.tangent_i);
+    add_shadowing(m, x.at, x.wo, x.cos_o, f, f.cos_o, f.tangent_o);
+    f.cos_i[3] -= 1.0 / x.cos_i;
   }
 
-  static FactorPartials scatter(const Diffuse& b, double, double cos_o, double, const Vec2d& uv,
-                                Scattering) {
+  static FactorPartials scatter(const Diffuse& b, const ScatterPoint& x) {
     FactorPartials f;
-    f.cos_o[3] = 1.0 / cos_o;
-    add_texture(b.reflectance, uv, f);
+    f.cos_o[3] = 1.0 / x.cos_o;
+    add_texture(b.reflectance, x.at.uv, f);
     return f;
   }
 
-  static FactorPartials scatter(const RoughConductor& b, double cos_i, double cos_o, double io,
-                                const Vec2d& uv, Scattering) {
+  static FactorPartials scatter(const RoughConductor& b, const ScatterPoint& x) {
     FactorPartials f;
-    add_microfacets(b.microfacets, 1.0, cos_i, cos_o, io, f);
-    const double h = std::sqrt(2.0 + 2.0 * io);
+    add_microfacets(b.microfacets, 1.0, x, f);
+    const double h = std::sqrt(2.0 + 2.0 * x.io);
     const RgbFresnel metal = fresnel(0.5 * h, b.eta, b.k);
     f.color = metal.value;
     f.io.head<3>() = log_slope(metal.slope, metal.value) * (0.5 / h);
-    add_texture(b.specular_reflectance, uv, f);
+    add_texture(b.specular_reflectance, x.at.uv, f);
     return f;
   }
 
-  static FactorPartials scatter(const RoughDielectric& b, double cos_i, double cos_o, double io,
-                                const Vec2d& uv, Scattering scattering) {
+  static FactorPartials scatter(const RoughDielectric& b, const ScatterPoint& x) {
     FactorPartials f;
-    const bool reflection = scattering == Scattering::Reflection;
-    const double eta = cos_i > 0.0 ? b.eta : 1.0 / b.eta;
+    const bool reflection = x.scattering == Scattering::Reflection;
+    const double eta = x.cos_i > 0.0 ? b.eta : 1.0 / b.eta;
     const double e = reflection ? 1.0 : eta;
-    add_microfacets(b.microfacets, e, cos_i, cos_o, io, f);
-    const double h2 = 1.0 + e * e + 2.0 * e * io;
-    const double i = 1.0 + e * io;
-    const double o = io + e;
+    add_microfacets(b.microfacets, e, x, f);
+    const double h2 = 1.0 + e * e + 2.0 * e * x.io;
+    const double i = 1.0 + e * x.io;
+    const double o = x.io + e;
     const double h = std::sqrt(h2);
     const Fresnel glass = fresnel(std::abs(i) * (1.0 / h), eta);
     const double d_cosine = std::copysign(e, i) * (1.0 - i / h2) / h;
     if (reflection) {
       f.io[3] += glass.slope / glass.value * d_cosine;
-      add_texture(b.specular_reflectance, uv, f);
+      add_texture(b.specular_reflectance, x.at.uv, f);
     } else {
       f.io[3] -= glass.slope / (1.0 - glass.value) * d_cosine;
       f.io[3] += e / i + 1.0 / o - 4.0 * e / (i + e * o);
-      add_texture(b.specular_transmittance, uv, f);
+      add_texture(b.specular_transmittance, x.at.uv, f);
     }
     return f;
   }
 
   /// (H11)
-  static FactorPartials scatter(const Phong& b, double cos_i, double cos_o, double io,
-                                const Vec2d& uv, Scattering) {
+  static FactorPartials scatter(const Phong& b, const ScatterPoint& x) {
     FactorPartials f;
-    f.cos_o[3] = 1.0 / cos_o;
-    const double mu = 2.0 * cos_i * cos_o - io;
+    f.cos_o[3] = 1.0 / x.cos_o;
+    const double mu = 2.0 * x.cos_i * x.cos_o - x.io;
     const double lobe = detail::phong_lobe(b, mu);
-    const Rgbd specular = b.specular_reflectance.eval(uv);
-    f.color = b.diffuse_reflectance.eval(uv) * kInvPi + specular * lobe;
+    const Rgbd specular = b.specular_reflectance.eval(x.at.uv);
+    f.color = b.diffuse_reflectance.eval(x.at.uv) * kInvPi + specular * lobe;
     if (lobe > 0.0) {
       const Rgbd d_mu = log_slope(specular * (b.exponent * lobe / mu), f.color);
-      f.cos_i.head<3>() = 2.0 * cos_o * d_mu;
-      f.cos_o.head<3>() = 2.0 * cos_i * d_mu;
+      f.cos_i.head<3>() = 2.0 * x.cos_o * d_mu;
+      f.cos_o.head<3>() = 2.0 * x.cos_i * d_mu;
       f.io.head<3>() = -d_mu;
     }
-    const Texture::Slopes d = b.diffuse_reflectance.slopes(uv);
-    const Texture::Slopes s = b.specular_reflectance.slopes(uv);
-    f.u.head<3>() = log_slope(d.u * kInvPi + s.u * lobe, f.color);
-    f.v.head<3>() = log_slope(d.v * kInvPi + s.v * lobe, f.color);
+    add_gloss_textures(b, lobe, x.at.uv, f);
     return f;
   }
 
-  /// (H38)
-  static FactorPartials scatter(const Ward& b, double cos_i, double cos_o, double io,
-                                const Vec2d& uv, Scattering) {
-    FactorPartials f;
-    f.cos_o[3] = 1.0 / cos_o;
-    const double lobe = detail::ward_lobe(b, cos_i, cos_o, io);
-    const Rgbd specular = b.specular_reflectance.eval(uv) * lobe;
-    f.color = b.diffuse_reflectance.eval(uv) * kInvPi + specular;
-    const bool balanced = b.variant == Ward::Variant::Balanced;
-    const double k = balanced ? 0.0 : b.variant == Ward::Variant::Ward ? 0.5 : 1.0;
-    const double h2 = 2.0 + 2.0 * io;
-    const double root = cos_i + cos_o;
-    const double cos2 = root * root / h2;
-    const double by_cos2 = d_log_d(b.microfacets(), cos2) + (balanced ? 0.0 : 2.0 / cos2);
-    const double by_root = by_cos2 * 2.0 * root / h2;
-    f.cos_i.head<3>() = log_slope(specular * (by_root - k / cos_i), f.color);
-    f.cos_o.head<3>() = log_slope(specular * (by_root - k / cos_o), f.color);
-    f.io.head<3>() =
-        log_slope(specular * (-2.0 * (by_cos2 * cos2 + (balanced ? 1.0 : 0.0)) / h2), f.color);
+  /// Of Phong and Ward: by the two reflectances.
+  template <class B>
+  static void add_gloss_textures(const B& b, double lobe, const Vec2d& uv, FactorPartials& f) {
     const Texture::Slopes d = b.diffuse_reflectance.slopes(uv);
     const Texture::Slopes s = b.specular_reflectance.slopes(uv);
     f.u.head<3>() = log_slope(d.u * kInvPi + s.u * lobe, f.color);
     f.v.head<3>() = log_slope(d.v * kInvPi + s.v * lobe, f.color);
+  }
+
+  /// (H38)
+  static FactorPartials scatter(const Ward& b, const ScatterPoint& x) {
+    const double lobe = detail::ward_lobe(b, x.at, x.wi, x.wo);
+    FactorPartials log_lobe;
+    add_distribution(b.microfacets(), 1.0, x, log_lobe);
+    if (b.variant == Ward::Variant::Balanced) {
+      log_lobe.io[3] -= 1.0 / (1.0 + x.io);
+    } else {
+      const double cos2 = (x.cos_i + x.cos_o) * (x.cos_i + x.cos_o) / (2.0 + 2.0 * x.io);
+      add_cos2(2.0 / cos2, 1.0, x, log_lobe);
+      const double k = b.variant == Ward::Variant::Ward ? 0.5 : 1.0;
+      log_lobe.cos_i[3] -= k / x.cos_i;
+      log_lobe.cos_o[3] -= k / x.cos_o;
+    }
+    const Rgbd specular = b.specular_reflectance.eval(x.at.uv) * lobe;
+    FactorPartials f;
+    f.color = b.diffuse_reflectance.eval(x.at.uv) * kInvPi + specular;
+    for (const auto by : kDirectionPartials)
+      (f.*by).head<3>() = log_slope(specular * (log_lobe.*by)[3], f.color);
+    f.cos_o[3] = 1.0 / x.cos_o;
+    add_gloss_textures(b, lobe, x.at.uv, f);
     return f;
   }
 
   /// Delta BSDFs do not scatter into free directions.
-  static FactorPartials scatter(const Conductor&, double, double, double, const Vec2d&,
-                                Scattering) {
+  static FactorPartials scatter(const Conductor&, const ScatterPoint&) {
     FactorPartials f;
     f.color.setZero();
     return f;
   }
-  static FactorPartials scatter(const Dielectric&, double, double, double, const Vec2d&,
-                                Scattering) {
+  static FactorPartials scatter(const Dielectric&, const ScatterPoint&) {
     FactorPartials f;
     f.color.setZero();
     return f;
   }
 
-  static FactorPartials scatter(const ThinDielectric&, double, double, double, const Vec2d&,
-                                Scattering) {
+  static FactorPartials scatter(const ThinDielectric&, const ScatterPoint&) {
     FactorPartials f;
     f.color.setZero();
     return f;
@@ -298,14 +389,13 @@ struct HandScatterRules {
   }
 
   /// (H29)
-  static FactorPartials scatter(const Plastic& b, double cos_i, double cos_o, double,
-                                const Vec2d& uv, Scattering) {
+  static FactorPartials scatter(const Plastic& b, const ScatterPoint& x) {
     FactorPartials f;
-    const Fresnel in = fresnel(cos_i, b.eta);
-    const Fresnel out = fresnel(cos_o, b.eta);
+    const Fresnel in = fresnel(x.cos_i, b.eta);
+    const Fresnel out = fresnel(x.cos_o, b.eta);
     f.cos_i[3] = -in.slope / (1.0 - in.value);
-    f.cos_o[3] = 1.0 / cos_o - out.slope / (1.0 - out.value);
-    const Albedo a = albedo(b.base, uv);
+    f.cos_o[3] = 1.0 / x.cos_o - out.slope / (1.0 - out.value);
+    const Albedo a = albedo(b.base, x.at.uv);
     f.color = a.value;
     f.u.head<3>() = log_slope(a.u, a.value);
     f.v.head<3>() = log_slope(a.v, a.value);
@@ -313,19 +403,19 @@ struct HandScatterRules {
   }
 
   /// (H30)
-  static FactorPartials scatter(const RoughPlastic& b, double cos_i, double cos_o, double io,
-                                const Vec2d& uv, Scattering) {
-    const auto part = detail::rough_plastic_parts(b, cos_i, cos_o, io);
+  static FactorPartials scatter(const RoughPlastic& b, const ScatterPoint& x) {
+    const auto part = detail::rough_plastic_parts(b, x.at, x.wi, x.wo);
     FactorPartials coat;
-    add_microfacets(b.microfacets, 1.0, cos_i, cos_o, io, coat);
-    const double h = std::sqrt(2.0 + 2.0 * io);
+    add_microfacets(b.microfacets, 1.0, x, coat);
+    const double h = std::sqrt(2.0 + 2.0 * x.io);
     const Fresnel fresnel_h = fresnel(0.5 * h, b.eta);
     coat.io[3] += fresnel_h.slope / fresnel_h.value * (0.5 / h);
-    const double base_i = b.transmittance.slope(cos_i) / b.transmittance.eval(cos_i);
-    const double base_o = b.transmittance.slope(cos_o) / b.transmittance.eval(cos_o) + 1.0 / cos_o;
-    const Rgbd specular = b.specular_reflectance.eval(uv) * part.specular;
-    const Texture::Slopes slopes = b.specular_reflectance.slopes(uv);
-    const Albedo a = albedo(b.base, uv);
+    const RoughTransmittance& t = b.transmittance;
+    const double base_i = t.slope(x.cos_i) / t.eval(x.cos_i);
+    const double base_o = t.slope(x.cos_o) / t.eval(x.cos_o) + 1.0 / x.cos_o;
+    const Rgbd specular = b.specular_reflectance.eval(x.at.uv) * part.specular;
+    const Texture::Slopes slopes = b.specular_reflectance.slopes(x.at.uv);
+    const Albedo a = albedo(b.base, x.at.uv);
     const Rgbd diffuse = a.value * part.diffuse;
     FactorPartials f;
     f.color = specular + diffuse;
@@ -340,37 +430,44 @@ struct HandScatterRules {
     return f;
   }
 
-  static FactorPartials scatter(const Mask& b, double cos_i, double cos_o, double io,
-                                const Vec2d& uv, Scattering scattering) {
+  static FactorPartials scatter(const Mask& b, const ScatterPoint& x) {
     FactorPartials f;
     if (b.nested == nullptr) {
       f.color.setZero();
       return f;
     }
-    f = scatter(b.nested->bsdf, cos_i, cos_o, io, uv, scattering);
-    add_texture(b.opacity, uv, f);
+    f = scatter(b.nested->bsdf, x);
+    add_texture(b.opacity, x.at.uv, f);
     return f;
   }
 
   /// (H39)
-  static FactorPartials scatter(const Coating& b, double cos_i, double cos_o, double io,
-                                const Vec2d& uv, Scattering scattering) {
-    const double inverse_eta2 = 1.0 / (b.eta * b.eta);
-    const double in = b.inner_cosine(cos_i);
-    const double out = b.inner_cosine(cos_o);
-    const double d_in = cos_i * inverse_eta2 / in;
-    const double d_out = cos_o * inverse_eta2 / out;
+  static FactorPartials scatter(const Coating& b, const ScatterPoint& x) {
+    const double inverse_eta = 1.0 / b.eta;
+    const double inverse_eta2 = inverse_eta * inverse_eta;
+    const double in = b.inner_cosine(x.cos_i);
+    const double out = b.inner_cosine(x.cos_o);
+    const double d_in = x.cos_i * inverse_eta2 / in;
+    const double d_out = x.cos_o * inverse_eta2 / out;
     const FactorPartials below = scatter(
-        b.nested->bsdf, in, out, (io - cos_i * cos_o) * inverse_eta2 + in * out, uv, scattering);
+        b.nested->bsdf, {x.at, b.inner(x.at.n, x.wi, x.cos_i), b.inner(x.at.n, x.wo, x.cos_o), in,
+                         out, (x.io - x.cos_i * x.cos_o) * inverse_eta2 + in * out, x.scattering});
     FactorPartials f = below;
-    f.color *= detail::coat_attenuation(b, cos_i, cos_o);
-    f.cos_i = below.cos_i * d_in + below.io * (out * d_in - cos_o * inverse_eta2);
-    f.cos_o = below.cos_o * d_out + below.io * (in * d_out - cos_i * inverse_eta2);
+    f.color *= detail::coat_attenuation(b, x.cos_i, x.cos_o);
+    const double lift = x.at.tangent.dot(x.at.n);
+    f.cos_i = below.cos_i * d_in + below.io * (out * d_in - x.cos_o * inverse_eta2) +
+              below.tangent_i * (lift * (d_in - inverse_eta));
+    f.cos_o = below.cos_o * d_out + below.io * (in * d_out - x.cos_i * inverse_eta2) +
+              below.tangent_o * (lift * (d_out - inverse_eta));
     f.io = below.io * inverse_eta2;
-    const Fresnel enter = fresnel(cos_i, b.eta);
-    const Fresnel leave = fresnel(cos_o, b.eta);
+    f.tangent_i = below.tangent_i * inverse_eta;
+    f.tangent_o = below.tangent_o * inverse_eta;
+    f.tangent_n += below.tangent_i * (in - x.cos_i * inverse_eta) +
+                   below.tangent_o * (out - x.cos_o * inverse_eta);
+    const Fresnel enter = fresnel(x.cos_i, b.eta);
+    const Fresnel leave = fresnel(x.cos_o, b.eta);
     f.cos_i[3] -= enter.slope / (1.0 - enter.value);
-    f.cos_o[3] += 1.0 / cos_o - d_out / out - leave.slope / (1.0 - leave.value);
+    f.cos_o[3] += 1.0 / x.cos_o - d_out / out - leave.slope / (1.0 - leave.value);
     f.cos_i.head<3>() += b.absorption * (d_in / (in * in));
     f.cos_o.head<3>() += b.absorption * (d_out / (out * out));
     return f;
@@ -402,31 +499,21 @@ struct HandScatterRules {
       return lanes;
     };
     const Texture::Slopes slopes = b.weight.slopes(uv);
-    f.cos_i = by(partials1.cos_i, partials2.cos_i, 0.0);
-    f.cos_o = by(partials1.cos_o, partials2.cos_o, 0.0);
-    f.io = by(partials1.io, partials2.io, 0.0);
+    for (const auto direction : kDirectionPartials)
+      f.*direction = by(partials1.*direction, partials2.*direction, 0.0);
     f.u = by(partials1.u, partials2.u, slopes.u[0]);
     f.v = by(partials1.v, partials2.v, slopes.v[0]);
     return f;
   }
-  /// Values are those of any directions with these cosines, n = z.
-  static FactorPartials scatter(const Blend& b, double cos_i, double cos_o, double io,
-                                const Vec2d& uv, Scattering scattering) {
-    const double sin_i = std::sqrt(std::max(0.0, 1.0 - cos_i * cos_i));
-    const double x = sin_i > 0.0 ? (io - cos_i * cos_o) / sin_i : 0.0;
-    const Vec3d wi(sin_i, 0.0, cos_i);
-    const Vec3d wo(x, std::sqrt(std::max(0.0, 1.0 - cos_o * cos_o - x * x)), cos_o);
-    const SurfacePoint<double> at{Vec3d::UnitZ(), uv};
+  static FactorPartials scatter(const Blend& b, const ScatterPoint& x) {
     const Bsdf& first = b.first->bsdf;
     const Bsdf& second = b.second->bsdf;
-    return blend(b, uv, eval(first, at, wi, wo), scatter(first, cos_i, cos_o, io, uv, scattering),
-                 eval(second, at, wi, wo), scatter(second, cos_i, cos_o, io, uv, scattering));
+    return blend(b, x.at.uv, eval(first, x.at, x.wi, x.wo), scatter(first, x),
+                 eval(second, x.at, x.wi, x.wo), scatter(second, x));
   }
 
-  static FactorPartials scatter(const Bsdf& bsdf, double cos_i, double cos_o, double io,
-                                const Vec2d& uv, Scattering scattering) {
-    return std::visit([&](const auto& b) { return scatter(b, cos_i, cos_o, io, uv, scattering); },
-                      bsdf);
+  static FactorPartials scatter(const Bsdf& bsdf, const ScatterPoint& x) {
+    return std::visit([&](const auto& b) { return scatter(b, x); }, bsdf);
   }
 };
 

@@ -4,6 +4,9 @@
 /// ConstraintVisitor:
 ///   slopes  r = m - n, m = h / h.n, h = w_i + e w_o:
 ///           dr = (dh - m (n.dh)) / h.n - m (m.dn) - dn                                    (H19)
+///           along the tangent and across it  r_u = (P.m - P.n) / L,  r_v = (n x P).m / L:
+///           dr_u = (m.dP + P.dm - P.dn - n.dP - r_u dL) / L,  L dL = P.dP - P.n (P.dn + n.dP)
+///           dr_v = (dn.(P x m) + dP.(m x n) + (n x P).dm - r_v dL) / L                    (H45)
 ///   diffuse r = w_o - c_o n:  dr = dw_o - c_o dn - n dc_o                                 (H20)
 ///   Phong   r = w_o - mirror: dr = dw_o - (2 c_i dn + 2 n dc_i - dw_i)                    (H21)
 ///   film    x = (right.v) / (2 a f), f = forward.v:
@@ -39,6 +42,9 @@ struct Columns {
 
 inline LocalRow dot(const Vec3d& a, const Columns& b) {
   return a.x() * b.x + a.y() * b.y + a.z() * b.z;
+}
+inline Columns cross(const Vec3d& a, const Columns& b) {
+  return {a.y() * b.z - a.z() * b.y, a.z() * b.x - a.x() * b.z, a.x() * b.y - a.y() * b.x};
 }
 inline Columns outer(const Vec3d& a, const LocalRow& row) {
   return {a.x() * row, a.y() * row, a.z() * row};
@@ -97,11 +103,19 @@ class StageSweep : RecordedPath<Rules> {
     Vec3d omega_t = Vec3d::Zero();
     Vec3d omega_b = Vec3d::Zero();
   };
-  /// The differentials of a vertex that the ray comes to.
+  /// The differentials of a vertex that the ray comes to; dP is that of (H44).
   struct Arrival {
     Columns dx = Columns::zero();
     Columns dwi = Columns::zero();
     Columns dn = Columns::zero();
+    Columns dP = Columns::zero();
+  };
+  /// Those of scattering there.
+  struct Scattered {
+    const Columns& dwi;
+    const Columns& dwo;
+    const Columns& dn;
+    const Columns& dP;
   };
 
   /// The next block, in the columns of u.
@@ -152,6 +166,7 @@ class StageSweep : RecordedPath<Rules> {
     at.dwi.set(columns_.omega, -ray_.omega_t);
     at.dwi.set(columns_.omega + 1, -ray_.omega_b);
     at.dn = normal(x.surface, at.dx);
+    if (x.shape->anisotropic) at.dP = cross(x.field.turn, at.dx) + x.field.spread * at.dx;
     return at;
   }
 
@@ -186,7 +201,7 @@ class StageSweep : RecordedPath<Rules> {
       stage.position = map(at.dx, ray_.xi_t, ray_.xi_b);
       stage.direction = map(dv, ray_.omega_t, ray_.omega_b);
     } else {
-      residuals(x, at.dwi, block_columns(), at.dn);
+      residuals(x, at, block_columns());
       take_direction();
       Stage& stage = close(Stage::Kind::Free, true);
       stage.position = map(at.dx, ray_.xi_t, ray_.xi_b);
@@ -258,7 +273,7 @@ class StageSweep : RecordedPath<Rules> {
       film(scene_.camera().cosine(v) / scene_.camera().scale * (across - outer(v, dot(v, across))),
            Columns::zero());
       position(*at.shape, y.dx);
-      residuals(at, y.dwi, Columns::zero(), y.dn);
+      residuals(at, y, Columns::zero());
       return;
     }
     const Vec3d w = -at.wo;
@@ -268,12 +283,12 @@ class StageSweep : RecordedPath<Rules> {
     if (path_.count > 0) {
       const Vertex& from = vertex(path_.count - 1);
       position(*from.shape, x.dx);
-      residuals(from, x.dwi, dw, x.dn);
+      residuals(from, x, dw);
     } else {
       film(dw, x.dx);
     }
     position(*at.shape, y.dx);
-    residuals(at, y.dwi, -1.0 * dw, y.dn);
+    residuals(at, y, -1.0 * dw);
   }
 
   Stage& close(Stage::Kind kind, bool has_block) {
@@ -344,24 +359,46 @@ class StageSweep : RecordedPath<Rules> {
     }
   }
 
-  void residuals(const Vertex& x, const Columns& dwi, const Columns& dwo, const Columns& dn) {
-    constrain(*x.bsdf, x, dwi, dwo, dn, 1.0);
+  void residuals(const Vertex& x, const Arrival& at, const Columns& dwo) {
+    constrain(*x.bsdf, x, {at.dwi, dwo, at.dn, at.dP}, 1.0);
   }
 
   /// (H19)
-  void slopes(const Microfacets& microfacets, double e, const Vertex& x, const Columns& dwi,
-              const Columns& dwo, const Columns& dn, double share) {
+  void slopes(const Microfacets& m, double e, const Vertex& x, const Scattered& d, double share) {
     const double hn = x.cos_i + e * x.cos_o;
-    const Vec3d m = (x.wi + e * x.wo) / hn;
-    const double s2 = (m - x.n_s).squaredNorm();
-    const double factor = std::sqrt(share) / (3.0 * std::sqrt(microfacets.slope_variance(s2)));
-    const Columns dh = dwi + e * dwo;
-    const LocalRow along = dot(x.n_s, dh) / hn + dot(m, dn);
-    add(factor, (1.0 / hn) * dh - outer(m, along) - dn);
+    const Vec3d h = (x.wi + e * x.wo) / hn;
+    const Columns dh = d.dwi + e * d.dwo;
+    const LocalRow along = dot(x.n_s, dh) / hn + dot(h, d.dn);
+    const Columns change = (1.0 / hn) * dh - outer(h, along);
+    if (!m.is_isotropic()) return slopes_by_axis(m, x, h, change, d, share);
+    const double t = (h - x.n_s).squaredNorm() / (m.alpha_u * m.alpha_u);
+    add(std::sqrt(share / m.slope_variance(m.alpha_u, t)) / 3.0, change - d.dn);
+  }
+  /// (H45), with m of (H19) and its differential.
+  void slopes_by_axis(const Microfacets& microfacets, const Vertex& x, const Vec3d& m,
+                      const Columns& dm, const Scattered& d, double share) {
+    const Vec3d& P = x.tangent;
+    const Vec3d across = x.n_s.cross(P);
+    const double lift = x.n_s.dot(P);
+    const double inverse = 1.0 / std::sqrt(P.squaredNorm() - lift * lift);
+    const double r_u = (P.dot(m) - lift) * inverse;
+    const double r_v = across.dot(m) * inverse;
+    const LocalRow d_lift = dot(P, d.dn) + dot(x.n_s, d.dP);
+    const LocalRow d_length = inverse * (dot(P, d.dP) - lift * d_lift);
+    const LocalRow d_u = dot(m, d.dP) + dot(P, dm) - d_lift - r_u * d_length;
+    const LocalRow d_v = dot(Vec3d(P.cross(m)), d.dn) + dot(Vec3d(m.cross(x.n_s)), d.dP) +
+                         dot(across, dm) - r_v * d_length;
+    const double u = r_u / microfacets.alpha_u;
+    const double v = r_v / microfacets.alpha_v;
+    const auto factor = [&](double alpha) {
+      return inverse / 3.0 * std::sqrt(share / microfacets.slope_variance(alpha, u * u + v * v));
+    };
+    add(factor(microfacets.alpha_u) * d_u);
+    add(factor(microfacets.alpha_v) * d_v);
   }
   /// (H20)
-  void diffuse(const Vertex& x, const Columns& dwo, const Columns& dn, double share) {
-    tangential(x.n_s, x.wo, x.cos_o, dwo, dn, share);
+  void diffuse(const Vertex& x, const Scattered& d, double share) {
+    tangential(x.n_s, x.wo, x.cos_o, d.dwo, d.dn, share);
   }
   void tangential(const Vec3d& n, const Vec3d& v, double cosine, const Columns& dv,
                   const Columns& dn, double share) {
@@ -372,68 +409,53 @@ class StageSweep : RecordedPath<Rules> {
 
   // `share` is that of the BSDF in a blend.
 
-  void constrain(const Bsdf& bsdf, const Vertex& x, const Columns& dwi, const Columns& dwo,
-                 const Columns& dn, double share) {
-    std::visit([&](const auto& b) { constrain(b, x, dwi, dwo, dn, share); }, bsdf);
+  void constrain(const Bsdf& bsdf, const Vertex& x, const Scattered& d, double share) {
+    std::visit([&](const auto& b) { constrain(b, x, d, share); }, bsdf);
   }
-  void constrain(const Diffuse&, const Vertex& x, const Columns&, const Columns& dwo,
-                 const Columns& dn, double share) {
-    diffuse(x, dwo, dn, share);
+  void constrain(const Diffuse&, const Vertex& x, const Scattered& d, double share) {
+    diffuse(x, d, share);
   }
-  void constrain(const Conductor&, const Vertex&, const Columns&, const Columns&, const Columns&,
-                 double) {}
-  void constrain(const Dielectric&, const Vertex&, const Columns&, const Columns&, const Columns&,
-                 double) {}
-  void constrain(const RoughConductor& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
-                 const Columns& dn, double share) {
-    slopes(b.microfacets, 1.0, x, dwi, dwo, dn, share);
+  void constrain(const Conductor&, const Vertex&, const Scattered&, double) {}
+  void constrain(const Dielectric&, const Vertex&, const Scattered&, double) {}
+  void constrain(const RoughConductor& b, const Vertex& x, const Scattered& d, double share) {
+    slopes(b.microfacets, 1.0, x, d, share);
   }
-  void constrain(const RoughDielectric& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
-                 const Columns& dn, double share) {
+  void constrain(const RoughDielectric& b, const Vertex& x, const Scattered& d, double share) {
     const double eta = x.cos_i > 0.0 ? b.eta : 1.0 / b.eta;
-    slopes(b.microfacets, x.scattering == Scattering::Reflection ? 1.0 : eta, x, dwi, dwo, dn,
-           share);
+    slopes(b.microfacets, x.scattering == Scattering::Reflection ? 1.0 : eta, x, d, share);
   }
   /// Two lobes; `add_glossy` takes the share of its one.
   template <class B, class AddGlossy>
-  void add_lobes(const B& b, const Vertex& x, const Columns& dwo, const Columns& dn, double share,
+  void add_lobes(const B& b, const Vertex& x, const Scattered& d, double share,
                  const AddGlossy& add_glossy) {
-    const auto lobes = detail::lobes<double>(b, x.cos_i, x.cos_o, x.io, x.uv);
+    const auto lobes = detail::lobes<double>(b, {x.n_s, x.uv, x.tangent}, x.wi, x.wo);
     if (!lobes.any()) return;
     const double glossy = lobes.glossy_share();
     if (glossy > 0.0) add_glossy(share * glossy);
-    if (glossy < 1.0) diffuse(x, dwo, dn, share * (1.0 - glossy));
+    if (glossy < 1.0) diffuse(x, d, share * (1.0 - glossy));
   }
   /// (H21)
-  void constrain(const Phong& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
-                 const Columns& dn, double share) {
-    add_lobes(b, x, dwo, dn, share, [&](double part) {
-      const LocalRow d_cos = dot(x.wi, dn) + dot(x.n_s, dwi);
-      const Columns mirror = 2.0 * x.cos_i * dn + outer(x.n_s, 2.0 * d_cos) - dwi;
-      add(std::sqrt(part * b.exponent) / 3.0, dwo - mirror);
+  void constrain(const Phong& b, const Vertex& x, const Scattered& d, double share) {
+    add_lobes(b, x, d, share, [&](double part) {
+      const LocalRow d_cos = dot(x.wi, d.dn) + dot(x.n_s, d.dwi);
+      const Columns mirror = 2.0 * x.cos_i * d.dn + outer(x.n_s, 2.0 * d_cos) - d.dwi;
+      add(std::sqrt(part * b.exponent) / 3.0, d.dwo - mirror);
     });
   }
   /// (H19)
-  void constrain(const Ward& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
-                 const Columns& dn, double share) {
-    add_lobes(b, x, dwo, dn, share,
-              [&](double part) { slopes(b.microfacets(), 1.0, x, dwi, dwo, dn, part); });
+  void constrain(const Ward& b, const Vertex& x, const Scattered& d, double share) {
+    add_lobes(b, x, d, share, [&](double part) { slopes(b.microfacets(), 1.0, x, d, part); });
   }
-  void constrain(const RoughPlastic& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
-                 const Columns& dn, double share) {
-    add_lobes(b, x, dwo, dn, share,
-              [&](double part) { slopes(b.microfacets, 1.0, x, dwi, dwo, dn, part); });
+  void constrain(const RoughPlastic& b, const Vertex& x, const Scattered& d, double share) {
+    add_lobes(b, x, d, share, [&](double part) { slopes(b.microfacets, 1.0, x, d, part); });
   }
 
-  void constrain(const ThinDielectric&, const Vertex&, const Columns&, const Columns&,
-                 const Columns&, double) {}
-  void constrain(const Plastic&, const Vertex& x, const Columns&, const Columns& dwo,
-                 const Columns& dn, double share) {
-    diffuse(x, dwo, dn, share);
+  void constrain(const ThinDielectric&, const Vertex&, const Scattered&, double) {}
+  void constrain(const Plastic&, const Vertex& x, const Scattered& d, double share) {
+    diffuse(x, d, share);
   }
-  void constrain(const Mask& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
-                 const Columns& dn, double share) {
-    if (b.nested != nullptr) constrain(b.nested->bsdf, x, dwi, dwo, dn, share);
+  void constrain(const Mask& b, const Vertex& x, const Scattered& d, double share) {
+    if (b.nested != nullptr) constrain(b.nested->bsdf, x, d, share);
   }
   /// (H40)
   static Columns inner(const Coating& b, const Vec3d& n, const Vec3d& w, double cosine,
@@ -443,34 +465,33 @@ class StageSweep : RecordedPath<Rules> {
     const double slope = cosine / (b.eta * b.eta * within) - 1.0 / b.eta;
     return (1.0 / b.eta) * dw + outer(n, slope * d_cos) + (within - cosine / b.eta) * dn;
   }
-  void constrain(const Coating& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
-                 const Columns& dn, double share) {
+  void constrain(const Coating& b, const Vertex& x, const Scattered& d, double share) {
     Vertex below = x;
     below.wi = b.inner(x.n_s, x.wi, x.cos_i);
     below.wo = b.inner(x.n_s, x.wo, x.cos_o);
     below.cos_i = b.inner_cosine(x.cos_i);
     below.cos_o = b.inner_cosine(x.cos_o);
     below.io = below.wi.dot(below.wo);
-    constrain(b.nested->bsdf, below, inner(b, x.n_s, x.wi, x.cos_i, dwi, dn),
-              inner(b, x.n_s, x.wo, x.cos_o, dwo, dn), dn, share);
+    constrain(b.nested->bsdf, below,
+              {inner(b, x.n_s, x.wi, x.cos_i, d.dwi, d.dn),
+               inner(b, x.n_s, x.wo, x.cos_o, d.dwo, d.dn), d.dn, d.dP},
+              share);
   }
-  void constrain(const Blend& b, const Vertex& x, const Columns& dwi, const Columns& dwo,
-                 const Columns& dn, double share) {
-    const auto of = detail::blend_shares<double>(b, {x.n_s, x.uv}, x.wi, x.wo);
-    if (of.first > 0.0) constrain(b.first->bsdf, x, dwi, dwo, dn, share * of.first);
-    if (of.second > 0.0) constrain(b.second->bsdf, x, dwi, dwo, dn, share * of.second);
+  void constrain(const Blend& b, const Vertex& x, const Scattered& d, double share) {
+    const auto of = detail::blend_shares<double>(b, {x.n_s, x.uv, x.tangent}, x.wi, x.wo);
+    if (of.first > 0.0) constrain(b.first->bsdf, x, d, share * of.first);
+    if (of.second > 0.0) constrain(b.second->bsdf, x, d, share * of.second);
   }
 
   /// w_o = e / r with e = y - x: (H18)
   void connection_rows(const Vertex& x, const Arrival& at) {
-    if (topology_.end == PathEnd::DirectionalConnection)
-      return residuals(x, at.dwi, Columns::zero(), at.dn);
+    if (topology_.end == PathEnd::DirectionalConnection) return residuals(x, at, Columns::zero());
     const double r = (this->connection_point() - x.p).norm();
     const bool area = topology_.end == PathEnd::AreaConnection;
     const Columns dy = area ? block_columns() : Columns::zero();
     const Columns de = dy - at.dx;
     const Columns dwo = (1.0 / r) * (de - outer(x.wo, dot(x.wo, de)));
-    residuals(x, at.dwi, dwo, at.dn);
+    residuals(x, at, dwo);
     if (area) position(this->emitter_shape(), dy);
     if (const SpotEmitter* light = this->spot()) add(1.0 / (3.0 * light->width()), dwo);
   }

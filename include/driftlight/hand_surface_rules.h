@@ -6,6 +6,7 @@
 ///   interpolated n = N / |N|, N = n_0 + b_1 e_1 + b_2 e_2:  dn = (I - n n^T) dN / |N|    (H15)
 ///   sphere           dn = dx' / R                                                        (H16)
 ///   relief           (H35), (H36) of hand_relief.h
+///   P of the tangent dP = turn x dx' + spread dx'                                        (H44)
 #pragma once
 
 #include <array>
@@ -34,7 +35,7 @@ struct SurfaceDifferential {
   }
 };
 
-/// The rules (H14) to (H16).
+/// The rules (H14) to (H16), (H44).
 struct HandSurfaceRules {
   /// n.v of (H14). On a sphere |n.v| = sqrt(R^2 - |l|^2) / R, l = o - c - b v, b = (o - c).v, as in
   /// geometry.h: near the silhouette n itself is too coarse. On a cylinder the same in the plane
@@ -59,6 +60,11 @@ struct HandSurfaceRules {
   /// The transpose of (I - v n^T / n.v) of (H14), at q; `cosine` is n.v.
   static Vec3d hit_adjoint(const Vec3d& v, const Vec3d& n, double cosine, const Vec3d& q) {
     return q - v.dot(q) / cosine * n;
+  }
+
+  /// (H44) transposed.
+  static Vec3d tangent_adjoint(const TangentField& field, const Vec3d& p_bar) {
+    return p_bar.cross(field.turn) + field.spread * p_bar;
   }
 
   /// (H15). `n_s` tells which side the normal was turned to.

@@ -3,8 +3,6 @@
 /// wrinkled surfaces, SIGGRAPH 1978), by a texture over a mesh with texture coordinates.
 #pragma once
 
-#include <optional>
-
 #include "driftlight/geometry.h"
 #include "driftlight/texture.h"
 
@@ -23,26 +21,6 @@ struct Relief {
   Texture texture;
   double scale = 1;  ///< of bumps, of either sign
 };
-
-/// dp/du and dp/dv over a triangle, in world space.
-struct SurfaceTangents {
-  Vec3d u, v;
-};
-
-/// None where the texture coordinates do not span the triangle: relief does nothing there.
-inline std::optional<SurfaceTangents> surface_tangents(const TriangleMesh& mesh,
-                                                       std::uint32_t triangle) {
-  const auto& index = mesh.triangles[triangle];
-  const std::array<Vec3d, 3> p = corners(mesh, triangle);
-  const Vec2d u0 = mesh.uvs[index[0]].cast<double>();
-  const Vec2d u1 = mesh.uvs[index[1]].cast<double>() - u0;
-  const Vec2d u2 = mesh.uvs[index[2]].cast<double>() - u0;
-  const double area = u1.x() * u2.y() - u1.y() * u2.x();
-  if (area == 0.0) return std::nullopt;
-  const Vec3d e1 = (p[1] - p[0]) / area;
-  const Vec3d e2 = (p[2] - p[0]) / area;
-  return SurfaceTangents{u2.y() * e1 - u1.y() * e2, u1.x() * e2 - u2.x() * e1};
-}
 
 namespace detail {
 
@@ -84,7 +62,8 @@ Vec3<T> relieved_normal(const Relief& relief, const SurfaceTangents& tangents, c
   return dot(value(n_g), value(normal)) < 0.0 ? Vec3<T>(-normal) : normal;
 }
 
-/// Gives the shading normal of the interaction, which has its uv, the relief.
+/// Gives the shading normal of the interaction, which has its uv, the relief; where texture
+/// coordinates do not span the triangle it does nothing.
 template <Scalar T>
 void relieve(const Relief& relief, const TriangleMesh& mesh, std::uint32_t triangle,
              Interaction<T>& at) {

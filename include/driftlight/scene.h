@@ -43,7 +43,8 @@ struct Shape {
   std::uint32_t material = 0;
   std::optional<std::uint32_t> emitter;
   ShapeExtent extent;
-  bool textured = false;  ///< something of the material or of the emission looks at uv
+  bool textured = false;     ///< something of the material or of the emission looks at uv
+  bool anisotropic = false;  ///< something of the material looks at the tangent
   /// The emission looks at the uv of a mesh that are not one linear function of the point.
   bool bent_emission = false;
   std::shared_ptr<const Relief> relief;  ///< of the material; only of meshes
@@ -93,6 +94,7 @@ class Scene {
   Interaction<T> interact(const Hit& hit, const Ray<T>& ray) const {
     const Shape& shape = shapes()[hit.shape];
     Interaction<T> at = driftlight::interact(shape.geometry, hit.primitive, ray, shape.textured);
+    if (shape.anisotropic) at.tangent = tangent_field(shape.geometry, hit.primitive).at(at.p);
     if (shape.relief != nullptr)
       relieve(*shape.relief, std::get<TriangleMesh>(shape.geometry), hit.primitive, at);
     return at;

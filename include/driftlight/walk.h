@@ -20,7 +20,7 @@ struct ScatterEvent {
   const Vec3<T>& wo;
   Scattering scattering;
 
-  SurfacePoint<T> surface() const { return {at.n_s, at.uv}; }
+  SurfacePoint<T> surface() const { return at.surface(); }
 };
 
 /// Does nothing; visitors derive from it and hide what they want to see.
@@ -122,7 +122,7 @@ struct WalkVertex {
   Vec3<T> w;
   const Bsdf& bsdf;
 
-  SurfacePoint<T> surface() const { return {at.n_s, at.uv}; }
+  SurfacePoint<T> surface() const { return at.surface(); }
   /// The event with the two directions in the order of the path.
   ScatterEvent<T> event(const Vec3<T>& wi, const Vec3<T>& wo) const {
     return {bsdf, shape, at, wi, wo, vertex.scattering};

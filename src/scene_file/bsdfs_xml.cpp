@@ -42,26 +42,35 @@ Texture read_scattering(Properties& properties, LoadContext& context, std::strin
   return texture;
 }
 
-double read_alpha(Properties& properties, LoadContext& context) {
+/// Roughness along the tangent and across it.
+struct Alpha {
+  double u, v;
+};
+/// `alpha` of both, or each by its name.
+Alpha read_alpha(Properties& properties, LoadContext& context) {
   constexpr double kLeast = 1e-4;
   const bool by_axis = properties.has("alphaU") || properties.has("alphaV");
   if (by_axis && properties.has("alpha"))
     properties.fail("alpha", "give either 'alpha' or 'alphaU' and 'alphaV'");
-  if (by_axis && !(properties.has("alphaU") && properties.has("alphaV")))
+  if (by_axis && properties.type() != "ward" &&
+      !(properties.has("alphaU") && properties.has("alphaV")))
     properties.element().fail("'alphaU' and 'alphaV' need each other");
-  const double alpha = properties.non_negative(by_axis ? "alphaU" : "alpha", 0.1);
-  if (by_axis && properties.number("alphaV", alpha) != alpha)
-    properties.fail("alphaV", "must equal 'alphaU': only isotropic roughness is supported");
-  if (alpha < kLeast)
+  const double u = properties.non_negative(by_axis ? "alphaU" : "alpha", 0.1);
+  const double v = by_axis ? properties.non_negative("alphaV", 0.1) : u;
+  if (std::min(u, v) < kLeast)
     context.notice(properties.element(), "roughness is raised to 0.0001, as in Mitsuba");
-  return std::max(alpha, kLeast);
+  return {std::max(u, kLeast), std::max(v, kLeast)};
 }
 
 Microfacets read_microfacets(Properties& properties, LoadContext& context) {
-  const std::string name = properties.choice("distribution", "beckmann", {"beckmann", "ggx"});
+  const std::string name =
+      properties.choice("distribution", "beckmann", {"beckmann", "ggx", "phong", "as"});
   properties.ignore({"sampleVisible"});
-  return {name == "ggx" ? Distribution::Ggx : Distribution::Beckmann,
-          read_alpha(properties, context)};
+  const Alpha alpha = read_alpha(properties, context);
+  if (name == "ggx") return {Distribution::Ggx, alpha.u, alpha.v};
+  if (name == "beckmann") return {Distribution::Beckmann, alpha.u, alpha.v};
+  // An exponent is not negative.
+  return {Distribution::Phong, std::min(alpha.u, 1.0), std::min(alpha.v, 1.0)};
 }
 
 Bsdf read_diffuse(Properties& properties, LoadContext& context) {
@@ -146,7 +155,9 @@ Bsdf read_ward(Properties& properties, LoadContext& context) {
   bsdf.variant = variant == "ward"        ? Ward::Variant::Ward
                  : variant == "ward-duer" ? Ward::Variant::Duer
                                           : Ward::Variant::Balanced;
-  bsdf.alpha = read_alpha(properties, context);
+  const Alpha alpha = read_alpha(properties, context);
+  bsdf.alpha_u = alpha.u;
+  bsdf.alpha_v = alpha.v;
   bsdf.diffuse_reflectance =
       read_textured(properties, "diffuseReflectance", Rgbd::Constant(0.5), context);
   bsdf.specular_reflectance =
@@ -176,6 +187,8 @@ Bsdf read_plastic(Properties& properties, LoadContext& context) {
 
 Bsdf read_rough_plastic(Properties& properties, LoadContext& context) {
   const Microfacets microfacets = read_microfacets(properties, context);
+  if (!microfacets.is_isotropic())
+    properties.fail("alphaV", "must equal 'alphaU': rough plastics are isotropic");
   return read_coated(properties, context,
                      [&](auto&&... of) { return RoughPlastic(microfacets, of...); });
 }
@@ -412,6 +425,10 @@ std::uint32_t material_index(Surface& surface, LoadContext& context) {
 
 bool is_textured(const Surface& surface) {
   return is_textured(surface.front) || (surface.back && is_textured(*surface.back));
+}
+
+bool is_isotropic(const Surface& surface) {
+  return is_isotropic(surface.front) && (!surface.back || is_isotropic(*surface.back));
 }
 
 }  // namespace driftlight

@@ -16,5 +16,7 @@ std::uint32_t material_index(Surface& surface, LoadContext& context);
 
 /// True if some BSDF of the surface has a texture that is not one colour.
 bool is_textured(const Surface& surface);
+/// False if some BSDF of the surface looks at the tangent.
+bool is_isotropic(const Surface& surface);
 
 }  // namespace driftlight

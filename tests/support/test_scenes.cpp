@@ -175,6 +175,10 @@ std::shared_ptr<const Relief> tilts() {
 
 Microfacets beckmann(double alpha) { return {Distribution::Beckmann, alpha}; }
 Microfacets ggx(double alpha) { return {Distribution::Ggx, alpha}; }
+Microfacets beckmann(double along, double across) {
+  return {Distribution::Beckmann, along, across};
+}
+Microfacets ggx(double along, double across) { return {Distribution::Ggx, along, across}; }
 
 /// Walls of the room [-2, 2] x [0, 3] x [-2, 2], seen from its front.
 void add_walls(Workshop& make, std::uint32_t floor, std::uint32_t back, std::uint32_t side) {
@@ -197,12 +201,12 @@ Scene room() {
   const auto back_screen = make.two_sided(Diffuse{gray(0.5)}, RoughConductor{beckmann(0.25)});
   make->add_shape(quad({0.6, 1.4, 0.4}, {0.9, 0, 0.5}, {0, -0.9, 0}, false, 0.15), back_screen);
 
-  RoughConductor gold{beckmann(0.15), kGoldEta, kGoldK, gray(1.0)};
+  RoughConductor gold{beckmann(0.3, 0.1), kGoldEta, kGoldK, gray(1.0)};
   make->add_shape(sphere_at({-0.7, 0.6, -0.7}, 0.6), make.one_sided(gold));
-  RoughConductor etched{ggx(0.2), kGoldEta, kGoldK, textured(8, 0.4, 1.0)};
+  RoughConductor etched{ggx(0.12, 0.35), kGoldEta, kGoldK, textured(8, 0.4, 1.0)};
   make->add_shape(round_mesh({0.8, 0.6, -0.9}, 0.6, 8), make.one_sided(etched));
-  const auto glossy = make.one_sided(Phong{gray(0.2), gray(0.7), 60});
-  make->add_shape(Disk{{-0.2, 0.02, 1.0}, {0.5, 0, 0}, {0, 0.1, -0.5}}, glossy);
+  const auto turned = make.one_sided(RoughConductor{{Distribution::Phong, 0.1, 0.3}});
+  make->add_shape(Disk{{-0.2, 0.02, 1.0}, {0.5, 0, 0}, {0, 0.1, -0.5}}, turned);
 
   const auto black = make.one_sided(Diffuse{gray(0.0)});
   make->add_shape(quad({-0.5, 2.98, -0.5}, {1, 0, 0}, {0, 0, 1}, true), black,
@@ -221,7 +225,8 @@ Scene glass() {
   const Texture tint = textured(8, 0.6, 1.0);
   make->add_shape(sphere_at({-1.0, 0.55, 0.9}, 0.5),
                   make.one_sided(Dielectric{kGlass, tint, tint}));
-  const auto frosted = make.one_sided(RoughDielectric{beckmann(0.15), kGlass, tint, gray(1.0)});
+  const auto frosted =
+      make.one_sided(RoughDielectric{beckmann(0.25, 0.1), kGlass, tint, gray(1.0)});
   make->add_shape(round_mesh({0.0, 0.6, 1.0}, 0.5, 8), frosted);
   const auto etched = make.one_sided(RoughDielectric{ggx(0.15), kGlass, gray(1.0), tint});
   make->add_shape(sphere_at({1.0, 0.55, 0.9}, 0.5), etched);
@@ -338,11 +343,9 @@ Scene coated(bool with_point) {
                   make.two_sided(Mask{gray(0.6), boxed(Plastic(kGlass, gray(0.6), tint, false))},
                                  Mask{gray(0.6), nullptr}));
   make->add_shape(sphere_at({-0.3, 1.5, -0.8}, 0.4), make.one_sided(Mask{gray(0.0), nullptr}));
-  const auto gold = [](double alpha) {
-    return RoughConductor{beckmann(alpha), kGoldEta, kGoldK, gray(1.0)};
-  };
+  const RoughConductor gold{beckmann(0.3, 0.12), kGoldEta, kGoldK, gray(1.0)};
   make->add_shape(sphere_at({0.9, 0.25, 1.6}, 0.25),
-                  make.one_sided(Coating{kGlass, tint, {0.1, 0.2, 0.3}, boxed(gold(0.2))}));
+                  make.one_sided(Coating{kGlass, tint, {0.1, 0.2, 0.3}, boxed(gold)}));
   make->add_shape(
       sphere_at({1.4, 0.3, 1.3}, 0.3),
       make.one_sided(Coating{1.3, gray(1.0), {0, 0, 0}, boxed(Diffuse{textured(8, 0.3, 0.8)})}));
@@ -366,16 +369,18 @@ Scene plan(bool with_caustics) {
   const auto floor = make.one_sided(Phong{textured(8, 0.2, 0.6), gray(0.3), 15}, tilts());
   add_walls(make, floor, plain, plain);
   make->add_shape(sphere_at({-0.8, 0.5, 0.2}, 0.5),
-                  make.one_sided(Ward{Ward::Variant::Duer, 0.2, gray(0.2), gray(0.4)}));
-  make->add_shape(round_mesh({0.5, 0.5, -0.3}, 0.5, 8),
-                  make.one_sided(Ward{Ward::Variant::Ward, 0.25, textured(8, 0.1, 0.5), gray(0.3)},
-                                 bumps(-0.08)));
+                  make.one_sided(Ward{Ward::Variant::Duer, 0.2, 0.4, gray(0.2), gray(0.4)}));
+  make->add_shape(
+      round_mesh({0.5, 0.5, -0.3}, 0.5, 8),
+      make.one_sided(Ward{Ward::Variant::Ward, 0.4, 0.15, textured(8, 0.1, 0.5), gray(0.3)},
+                     bumps(-0.08)));
   const Texture weight = textured(8, 0.1, 0.9);
   make->add_shape(
       sphere_at({-1.3, 0.35, 1.1}, 0.35),
-      make.one_sided(Blend{
-          weight, boxed(Ward{Ward::Variant::Balanced, 0.15, textured(8, 0.3, 0.6), gray(0.3)}),
-          boxed(RoughConductor{ggx(0.15), kGoldEta, kGoldK, gray(1.0)})}));
+      make.one_sided(
+          Blend{weight,
+                boxed(Ward{Ward::Variant::Balanced, 0.15, 0.15, textured(8, 0.3, 0.6), gray(0.3)}),
+                boxed(RoughConductor{ggx(0.1, 0.25), kGoldEta, kGoldK, gray(1.0)})}));
   make->add_shape(
       quad({0.9, 0.1, -1.2}, {0.9, 0, 0.4}, {0, 1.4, 0}, true, 0.1),
       make.two_sided(
@@ -387,10 +392,11 @@ Scene plan(bool with_caustics) {
   if (with_caustics) {
     make->add_shape(
         round_mesh({0.6, 0.3, 1.2}, 0.3, 6),
-        make.one_sided(Blend{weight, boxed(RoughDielectric{ggx(0.2), kGlass, gray(1.0), gray(1.0)}),
-                             boxed(Blend{gray(0.5), boxed(Dielectric{kGlass, gray(1.0), gray(1.0)}),
-                                         boxed(Diffuse{gray(0.6)})})},
-                       tilts()));
+        make.one_sided(
+            Blend{weight, boxed(RoughDielectric{ggx(0.15, 0.3), kGlass, gray(1.0), gray(1.0)}),
+                  boxed(Blend{gray(0.5), boxed(Dielectric{kGlass, gray(1.0), gray(1.0)}),
+                              boxed(Diffuse{gray(0.6)})})},
+            tilts()));
     make->add_shape(sphere_at({-0.1, 0.3, 0.9}, 0.3),
                     make.one_sided(Dielectric{kGlass, gray(1.0), gray(1.0)}));
     make->add_shape(sphere_at({1.2, 0.4, 0.6}, 0.4),
