@@ -2,63 +2,43 @@
 /// The textures of BSDFs.
 #pragma once
 
+#include <memory>
+#include <type_traits>
 #include <variant>
 
 #include "driftlight/bsdf.h"
 
 namespace driftlight {
 
-/// Calls `visit` with each texture of the BSDF.
-template <class Visit>
-void for_each_texture(const Bsdf& bsdf, const Visit& visit) {
-  struct Visitor {
-    const Visit& visit;
-    void operator()(const Diffuse& b) const { visit(b.reflectance); }
-    void operator()(const Conductor& b) const { visit(b.specular_reflectance); }
-    void operator()(const RoughConductor& b) const { visit(b.specular_reflectance); }
-    void operator()(const Dielectric& b) const {
-      visit(b.specular_reflectance);
-      visit(b.specular_transmittance);
-    }
-    void operator()(const RoughDielectric& b) const {
-      visit(b.specular_reflectance);
-      visit(b.specular_transmittance);
-    }
-    void operator()(const Phong& b) const {
-      visit(b.diffuse_reflectance);
-      visit(b.specular_reflectance);
-    }
-    void operator()(const Ward& b) const {
-      visit(b.diffuse_reflectance);
-      visit(b.specular_reflectance);
-    }
-    void operator()(const Plastic& b) const {
-      visit(b.base.reflectance);
-      visit(b.specular_reflectance);
-    }
-    void operator()(const RoughPlastic& b) const {
-      visit(b.base.reflectance);
-      visit(b.specular_reflectance);
-    }
-    void operator()(const ThinDielectric& b) const {
-      visit(b.specular_reflectance);
-      visit(b.specular_transmittance);
-    }
-    void operator()(const Mask& b) const {
-      visit(b.opacity);
-      if (b.nested != nullptr) for_each_texture(b.nested->bsdf, visit);
-    }
-    void operator()(const Coating& b) const {
-      visit(b.specular_reflectance);
-      for_each_texture(b.nested->bsdf, visit);
-    }
-    void operator()(const Blend& b) const {
-      visit(b.weight);
-      for_each_texture(b.first->bsdf, visit);
-      for_each_texture(b.second->bsdf, visit);
+/// Calls `visit` with each texture of the BSDF. If that may be changed, BSDFs nested in it are
+/// copied, as others may share them.
+template <class AnyBsdf, class Visit>
+void for_each_texture(AnyBsdf& bsdf, const Visit& visit) {
+  constexpr bool kIsConst = std::is_const_v<AnyBsdf>;
+  const auto visit_nested = [&](auto& box) {
+    if (box == nullptr) return;
+    if constexpr (kIsConst) {
+      for_each_texture(box->bsdf, visit);
+    } else {
+      const auto copy = std::make_shared<BsdfBox>(*box);
+      for_each_texture(copy->bsdf, visit);
+      box = copy;
     }
   };
-  std::visit(Visitor{visit}, bsdf);
+  std::visit(
+      [&](auto& b) {
+        if constexpr (requires { b.reflectance; }) visit(b.reflectance);
+        if constexpr (requires { b.diffuse_reflectance; }) visit(b.diffuse_reflectance);
+        if constexpr (requires { b.base; }) visit(b.base.reflectance);
+        if constexpr (requires { b.specular_reflectance; }) visit(b.specular_reflectance);
+        if constexpr (requires { b.specular_transmittance; }) visit(b.specular_transmittance);
+        if constexpr (requires { b.opacity; }) visit(b.opacity);
+        if constexpr (requires { b.weight; }) visit(b.weight);
+        if constexpr (requires { b.nested; }) visit_nested(b.nested);
+        if constexpr (requires { b.first; }) visit_nested(b.first);
+        if constexpr (requires { b.second; }) visit_nested(b.second);
+      },
+      bsdf);
 }
 
 /// True if some texture is not one colour.

@@ -3,6 +3,8 @@
 #include <OpenImageIO/imageio.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "driftlight/scene_file.h"
 #include "support/scene_directory.h"
 
@@ -126,6 +128,116 @@ TEST(TexturesXml, EnergyOfPatternsIsConserved) {
   const Texture& board = std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance;
   EXPECT_NEAR(board.maximum(), 0.99, 1e-12);
   EXPECT_EQ(loaded.notices.size(), 1U);
+}
+
+// --- Vertex colours ------------------------------------------------------------------------------
+
+/// Two triangles; the colours of the corners of the rectangle are red, green, blue and grey.
+std::string colored_ply(const std::string& type, const std::string& one, const std::string& half) {
+  std::string text = "ply\nformat ascii 1.0\nelement vertex 4\n";
+  for (const char* name : {"x", "y", "z"}) text += std::string("property float ") + name + "\n";
+  for (const char* name : {"red", "green", "blue"}) text += "property " + type + " " + name + "\n";
+  text += "element face 2\nproperty list uchar int vertex_indices\nend_header\n";
+  text += "0 0 0 " + one + " 0 0\n2 0 0 0 " + one + " 0\n2 1 0 0 0 " + one + "\n0 1 0 " + half +
+          " " + half + " " + half + "\n3 0 1 2\n3 0 2 3\n";
+  return text;
+}
+
+/// Shapes of colored.ply.
+LoadedScene load_colored(const std::string& ply, const std::string& shapes,
+                         const std::string& version = "0.6.0") {
+  const SceneDirectory directory;
+  directory.write("colored.ply", ply);
+  return directory.load("<scene version=\"" + version + "\">" + shapes + test::kSensor +
+                        test::kEmitter + "</scene>");
+}
+
+std::string colored_shape(const std::string& content) {
+  return R"(<shape type="ply"><string name="filename" value="colored.ply"/>)" + content +
+         "</shape>";
+}
+
+const std::string kVertexColors = R"(<texture name="reflectance" type="vertexcolors"/>)";
+
+/// The texture's colour at the point (x, y) of the first shape.
+Rgbd color_at(const LoadedScene& loaded, const Texture& texture, double x, double y) {
+  const Geometry& geometry = loaded.scene.shapes()[0].geometry;
+  const std::uint32_t triangle = y < 0.5 * x ? 0 : 1;
+  const Ray<double> ray{{x, y, 1}, {0, 0, -1}};
+  return texture.eval<double>(interact(geometry, triangle, ray, true).uv);
+}
+
+// Law: colours are linear over each triangle, whatever their type and the dialect.
+TEST(VertexColors, AreLinearOverTriangles) {
+  const double half = std::pow((0.5 + 0.055) / 1.055, 2.4);
+  const auto expect_colors = [](const LoadedScene& loaded, double grey) {
+    const Texture& texture = std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance;
+    for (const double u : {0.001, 0.3, 0.7, 0.999}) {
+      for (const double v : {0.0005, 0.2, 0.8, 0.9995}) {
+        const Rgbd expected =
+            v < u ? Rgbd(1.0 - u, u - v, v) : Rgbd(Rgbd(1.0 - v, 0.0, u) + (v - u) * grey);
+        expect_near(color_at(loaded, texture, 2.0 * u, v), expected);
+      }
+    }
+  };
+  const std::string shape = colored_shape("<bsdf type=\"diffuse\">" + kVertexColors + "</bsdf>");
+  expect_colors(load_colored(colored_ply("float", "1", "0.5"), shape), half);
+  expect_colors(load_colored(colored_ply("uchar", "255", "128"), shape),
+                std::pow((128.0 / 255.0 + 0.055) / 1.055, 2.4));
+  const std::string linear = colored_shape(
+      R"(<boolean name="srgb" value="false"/><bsdf type="diffuse">)" + kVertexColors + "</bsdf>");
+  expect_colors(load_colored(colored_ply("float", "1", "0.5"), linear), 0.5);
+  const std::string newer = colored_shape(
+      R"(<bsdf type="diffuse"><texture name="reflectance" type="mesh_attribute">
+         <string name="name" value="vertex_color"/></texture></bsdf>)");
+  expect_colors(load_colored(colored_ply("float", "1", "0.5"), newer, "3.0.0"), 0.5);
+}
+
+// Law: shapes that share a bsdf keep their own colours, also in bsdfs that are nested.
+TEST(VertexColors, BelongToTheirShapes) {
+  const std::string shared =
+      R"(<bsdf type="mask" id="b"><float name="opacity" value="0.5"/>
+         <bsdf type="twosided"><bsdf type="diffuse">)" +
+      kVertexColors + "</bsdf></bsdf></bsdf>";
+  const LoadedScene loaded = load_colored(
+      colored_ply("float", "1", "0.5"),
+      shared + colored_shape(R"(<ref id="b"/>)") +
+          colored_shape(
+              R"(<ref id="b"/><transform name="toWorld"><translate z="1"/></transform>)"));
+  const auto bitmap_of = [&](std::size_t shape) {
+    const Material& material = loaded.scene.materials()[loaded.scene.shapes()[shape].material];
+    const auto& mask = std::get<Mask>(loaded.scene.bsdfs()[material.front]);
+    return std::get<Diffuse>(mask.nested->bsdf).reflectance.bitmap;
+  };
+  EXPECT_NE(bitmap_of(0), bitmap_of(1));
+  EXPECT_EQ(bitmap_of(0)->width, 4);
+  EXPECT_EQ(bitmap_of(1)->height, 2);
+}
+
+TEST(VertexColors, AreRefusedWhereTheyCannotBe) {
+  const std::string plain = colored_ply("float", "1", "0.5");
+  const auto error = [&](const std::string& shapes, const std::string& version = "0.6.0") {
+    return test::scene_error([&] { load_colored(plain, shapes, version); });
+  };
+  const std::string diffuse = "<bsdf type=\"diffuse\">" + kVertexColors + "</bsdf>";
+  expect_contains(error("<shape type=\"sphere\">" + diffuse + "</shape>"), "no vertex colours");
+  expect_contains(error(colored_shape(R"(<bsdf type="bumpmap"><texture type="checkerboard"/>)" +
+                                      diffuse + "</bsdf>")),
+                  "bump map");
+  expect_contains(
+      error(colored_shape(R"(<bsdf type="mask"><texture name="opacity" type="checkerboard"/>)" +
+                          diffuse + "</bsdf>")),
+      "another texture");
+  expect_contains(
+      error(colored_shape(
+          R"(<emitter type="area"><texture name="radiance" type="vertexcolors"/></emitter>)")),
+      "radiance");
+  expect_contains(
+      error(colored_shape(
+                R"(<bsdf type="diffuse"><texture name="reflectance" type="mesh_attribute">
+                   <string name="name" value="face_color"/></texture></bsdf>)"),
+            "3.0.0"),
+      "vertex_color");
 }
 
 }  // namespace

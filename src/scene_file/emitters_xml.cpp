@@ -11,6 +11,7 @@
 #include "daylight.h"
 #include "properties.h"
 #include "textures_xml.h"
+#include "vertex_colors.h"
 
 namespace driftlight {
 namespace {
@@ -252,6 +253,8 @@ Texture read_area_radiance(const Element& element, LoadContext& context) {
   if (properties.type() != "area")
     element.fail("unknown " + properties.description() + " in a shape; valid are: area");
   const Texture radiance = read_textured(properties, "radiance", kWhite, context);
+  if (is_vertex_colors(radiance))
+    properties.fail("radiance", "vertex colours cannot be a radiance");
   properties.ignore({"samplingWeight"});
   properties.finish();
   context.objects.define(element, NamedObjects::Other{});

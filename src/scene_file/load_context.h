@@ -31,6 +31,8 @@ struct Surface {
 struct ShapePart {
   Geometry geometry;
   std::shared_ptr<Surface> surface = nullptr;
+  std::vector<Eigen::Vector3f> colors =
+      {};  ///< linear, of a mesh's vertices; empty, or one for each
 };
 
 /// What a <shape type="shapegroup"> stands for, in its own space.

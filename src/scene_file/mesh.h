@@ -3,10 +3,17 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <vector>
 
 #include "driftlight/scene.h"
 
 namespace driftlight {
+
+/// A mesh as files have it, in object space.
+struct ColoredMesh {
+  TriangleMesh mesh;
+  std::vector<Eigen::Vector3f> colors;  ///< of the vertices; empty, or one for each
+};
 
 /// Throws InputError if the mesh is empty, or has an index out of range or a number that is not
 /// finite.

@@ -12,7 +12,6 @@
 #include <string_view>
 
 #include "driftlight/error.h"
-#include "mesh.h"
 #include "ply_header.h"
 #include "text.h"
 
@@ -98,9 +97,10 @@ class PlyValues {
   PlyEncoding encoding_;
 };
 
-/// Where a property of a vertex belongs: x, y, z, nx, ny, nz, u, v.
+/// Where a property of a vertex belongs: x, y, z, nx, ny, nz, u, v, red, green, blue.
+constexpr std::size_t kSlotCount = 11;
 std::optional<std::size_t> vertex_slot(const PlyProperty& property) {
-  constexpr std::array<std::pair<std::string_view, std::size_t>, 12> kSlots{{
+  constexpr std::array<std::pair<std::string_view, std::size_t>, 21> kSlots{{
       {"x", 0},
       {"y", 1},
       {"z", 2},
@@ -113,6 +113,15 @@ std::optional<std::size_t> vertex_slot(const PlyProperty& property) {
       {"t", 7},
       {"texture_u", 6},
       {"texture_v", 7},
+      {"red", 8},
+      {"green", 9},
+      {"blue", 10},
+      {"diffuse_red", 8},
+      {"diffuse_green", 9},
+      {"diffuse_blue", 10},
+      {"r", 8},
+      {"g", 9},
+      {"b", 10},
   }};
   for (const auto& [name, slot] : kSlots)
     if (property.name == name && !property.count_type) return slot;
@@ -147,19 +156,25 @@ class PlyReader {
     TriangleMesh& mesh = file_.mesh;
     if (!mesh.positions.empty()) throw InputError("it has two lists of vertices");
     std::vector<std::optional<std::size_t>> slots;
-    std::array<bool, 8> has{};
+    std::array<bool, kSlotCount> has{};
+    std::array<float, kSlotCount> unit{};
     for (const PlyProperty& property : element.properties) {
       slots.push_back(vertex_slot(property));
-      if (slots.back())
+      if (slots.back()) {
         has.at(*slots.back()) = true;
-      else
+        const bool is_whole =
+            property.type != PlyType::Float32 && property.type != PlyType::Float64;
+        unit.at(*slots.back()) = is_whole ? 255.0F : 1.0F;
+      } else {
         file_.unused.push_back("vertex " + property.name);
+      }
     }
     if (!has[0] || !has[1] || !has[2]) throw InputError("its vertices lack x, y or z");
     const bool has_normals = has[3] && has[4] && has[5];
     const bool has_uvs = has[6] && has[7];
+    const bool has_colors = has[8] && has[9] && has[10];
     mesh.positions.reserve(element.count);
-    std::array<float, 8> row{};
+    std::array<float, kSlotCount> row{};
     for (std::uint64_t i = 0; i < element.count; ++i) {
       for (std::size_t k = 0; k < slots.size(); ++k) {
         if (slots[k])
@@ -170,6 +185,8 @@ class PlyReader {
       mesh.positions.emplace_back(row[0], row[1], row[2]);
       if (has_normals) mesh.normals.emplace_back(row[3], row[4], row[5]);
       if (has_uvs) mesh.uvs.emplace_back(row[6], row[7]);
+      if (has_colors)
+        file_.colors.emplace_back(row[8] / unit[8], row[9] / unit[9], row[10] / unit[10]);
     }
   }
 

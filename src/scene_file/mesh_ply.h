@@ -6,18 +6,19 @@
 #include <string>
 #include <vector>
 
-#include "driftlight/scene.h"
+#include "mesh.h"
 
 namespace driftlight {
 
-struct PlyFile {
-  TriangleMesh mesh;  ///< in object space
-  /// Properties of vertices and faces that are not used, such as "vertex red".
+/// Colours are as the file has them, of whole numbers the share of 255.
+struct PlyFile : ColoredMesh {
+  /// Properties of vertices and faces that are not used, such as "vertex confidence".
   std::vector<std::string> unused;
 };
 
-/// Reads positions, and where the file has them normals (nx, ny, nz) and texture coordinates (u, v
-/// or s, t or texture_u, texture_v) of the vertices; polygons become fans of triangles. Text and
+/// Reads positions, and where the file has them normals (nx, ny, nz), texture coordinates (u, v or
+/// s, t or texture_u, texture_v) and colours (red, green, blue, or with diffuse_ before them, or r,
+/// g, b) of the vertices; polygons become fans of triangles. Text and
 /// binary files of both byte orders. Throws InputError.
 PlyFile read_ply(const std::filesystem::path& file);
 

@@ -10,7 +10,6 @@
 #include <string>
 
 #include "driftlight/error.h"
-#include "mesh.h"
 
 // A .serialized file is a sequence of meshes, then the offsets of them all (64 bits each, 32 in
 // version 3), then their number (32 bits). A mesh is the 16-bit numbers 0x041C and the version,
@@ -144,30 +143,32 @@ std::vector<Eigen::Matrix<float, N, 1>> read_vectors(InflateStream& stream, std:
 
 template <class File>
 void read_vertices(InflateStream& stream, std::uint32_t flags, std::size_t count,
-                   TriangleMesh& mesh) {
+                   ColoredMesh& file) {
+  TriangleMesh& mesh = file.mesh;
   mesh.positions = read_vectors<File, 3>(stream, count);
   if (flags & kHasNormals) mesh.normals = read_vectors<File, 3>(stream, count);
   if (flags & kHasTexCoords) mesh.uvs = read_vectors<File, 2>(stream, count);
-  if (flags & kHasColors) read_vectors<File, 3>(stream, count);
+  if (flags & kHasColors) file.colors = read_vectors<File, 3>(stream, count);
 }
 
-TriangleMesh read_mesh(InflateStream& stream, std::uint16_t version) {
+ColoredMesh read_mesh(InflateStream& stream, std::uint16_t version) {
   const auto flags = stream.number<std::uint32_t>();
   if (version == 4)
     while (stream.number<char>() != '\0') continue;  // the name
   const auto vertices = stream.number<std::uint64_t>();
   const auto triangles = stream.number<std::uint64_t>();
-  TriangleMesh mesh;
+  ColoredMesh file;
+  TriangleMesh& mesh = file.mesh;
   if (flags & kDoublePrecision)
-    read_vertices<double>(stream, flags, vertices, mesh);
+    read_vertices<double>(stream, flags, vertices, file);
   else
-    read_vertices<float>(stream, flags, vertices, mesh);
+    read_vertices<float>(stream, flags, vertices, file);
   stream.expect(triangles, sizeof(mesh.triangles[0]));
   mesh.triangles.resize(triangles);
   stream.read(mesh.triangles.data(), triangles * sizeof(mesh.triangles[0]));
   stream.check_sum();
   check_mesh(mesh);
-  return mesh;
+  return file;
 }
 
 /// Where mesh `index` begins. The first needs no table of offsets, and may have none.
@@ -195,7 +196,7 @@ std::uint16_t read_version(BinaryFile& file, std::uint64_t offset) {
 
 }  // namespace
 
-TriangleMesh read_serialized(const std::filesystem::path& file, int shape_index) {
+ColoredMesh read_serialized(const std::filesystem::path& file, int shape_index) {
   try {
     if (shape_index < 0) throw InputError("a shapeIndex must not be negative");
     BinaryFile bytes(file);

@@ -4,12 +4,12 @@
 
 #include <filesystem>
 
-#include "driftlight/scene.h"
+#include "mesh.h"
 
 namespace driftlight {
 
-/// Mesh number `shape_index` (from 0) of a .serialized file of version 3 or 4, in object space.
+/// Mesh number `shape_index` (from 0) of a .serialized file of version 3 or 4. Colours are linear.
 /// Throws InputError.
-TriangleMesh read_serialized(const std::filesystem::path& file, int shape_index);
+ColoredMesh read_serialized(const std::filesystem::path& file, int shape_index);
 
 }  // namespace driftlight

@@ -11,6 +11,7 @@
 #include "mesh_ply.h"
 #include "mesh_serialized.h"
 #include "shape_readers.h"
+#include "spectrum.h"
 
 namespace driftlight {
 namespace {
@@ -34,9 +35,16 @@ void finish_mesh(Properties& properties, TriangleMesh& mesh, Mirrored mirrored) 
   finish_normals(mesh, face_normals, properties.boolean("flipNormals", false));
 }
 
-}  // namespace
-
-namespace {
+/// Likewise of a mesh with colours, which splitting at creases loses.
+ShapePart finish_colored(Properties& properties, ColoredMesh&& file, Mirrored mirrored,
+                         LoadContext& context) {
+  finish_mesh(properties, file.mesh, mirrored);
+  if (properties.has("maxSmoothAngle") && !file.colors.empty()) {
+    context.notice(properties.element(), "'maxSmoothAngle' loses the colours of the vertices");
+    file.colors.clear();
+  }
+  return {std::move(file.mesh), nullptr, std::move(file.colors)};
+}
 
 /// A file named in an obj file, beside it or among those of the scene.
 std::filesystem::path find_beside(const std::filesystem::path& obj, const std::string& name,
@@ -103,7 +111,8 @@ std::vector<ShapePart> read_ply_shape(Properties& properties, LoadContext& conte
                                       const Attachments&) {
   const std::string name = properties.required_text("filename");
   const bool flip = properties.boolean("flipTexCoords", false);
-  properties.ignore({"srgb"});  // of the colours, which no texture here looks at
+  // In Mitsuba 0.6 colours are sRGB unless it is told otherwise, in Mitsuba 3 linear.
+  const bool is_srgb = properties.boolean("srgb", properties.dialect() != Dialect::Mitsuba3);
   PlyFile file = with_location(properties.element(),
                                [&] { return read_ply(properties.element().find_file(name)); });
   if (flip)
@@ -111,19 +120,20 @@ std::vector<ShapePart> read_ply_shape(Properties& properties, LoadContext& conte
   if (!file.unused.empty())
     context.notice(properties.element(), fmt::format("'{}' has properties that are not used: {}",
                                                      name, join(file.unused)));
-  finish_mesh(properties, file.mesh, Mirrored::TurnsInsideOut);
-  return {{std::move(file.mesh)}};
+  if (is_srgb)
+    for (Eigen::Vector3f& color : file.colors)
+      color = color.unaryExpr([](float c) { return static_cast<float>(srgb_to_linear(c)); });
+  return {finish_colored(properties, std::move(file), Mirrored::TurnsInsideOut, context)};
 }
 
-std::vector<ShapePart> read_serialized_shape(Properties& properties, LoadContext&,
+std::vector<ShapePart> read_serialized_shape(Properties& properties, LoadContext& context,
                                              const Attachments&) {
   const std::string name = properties.required_text("filename");
   const int index = properties.integer("shapeIndex", 0);
-  TriangleMesh mesh = with_location(properties.element(), [&] {
+  ColoredMesh file = with_location(properties.element(), [&] {
     return read_serialized(properties.element().find_file(name), index);
   });
-  finish_mesh(properties, mesh, Mirrored::KeepsOutside);
-  return {{std::move(mesh)}};
+  return {finish_colored(properties, std::move(file), Mirrored::KeepsOutside, context)};
 }
 
 }  // namespace driftlight

@@ -5,6 +5,7 @@
 
 #include "bsdfs_xml.h"
 #include "textures_xml.h"
+#include "vertex_colors.h"
 
 namespace driftlight {
 namespace {
@@ -35,6 +36,8 @@ Surface read_relief(Properties& properties, LoadContext& context, Relief relief)
     properties.element().fail(properties.description() + " needs a texture and a nested bsdf");
   if (nested->relief)
     properties.element().fail("bump and normal maps cannot be nested in each other");
+  if (is_vertex_colors(*texture))
+    properties.element().fail("vertex colours cannot be a bump or normal map");
   relief.texture = *texture;
   Surface result = *nested;
   result.material.reset();

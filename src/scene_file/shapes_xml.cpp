@@ -11,6 +11,7 @@
 #include "properties.h"
 #include "shape_readers.h"
 #include "transform_geometry.h"
+#include "vertex_colors.h"
 
 namespace driftlight {
 namespace {
@@ -79,9 +80,23 @@ ShapeParts read_parts(Properties& properties, LoadContext& context, ShapeReader 
   return shape;
 }
 
-void add_shape(const Element& element, Geometry geometry, Surface& surface,
-               const std::optional<Texture>& radiance, LoadContext& context) {
+void add_shape(const Element& element, ShapePart part, const std::optional<Texture>& radiance,
+               LoadContext& context) {
+  Geometry& geometry = part.geometry;
+  auto* mesh = std::get_if<TriangleMesh>(&geometry);
+  if (looks_at_vertex_colors(*part.surface)) {
+    if (part.colors.empty())
+      element.fail("the shape has no vertex colours, which a texture of its bsdf looks at");
+    part.surface = with_location(element, [&] {
+      return std::make_shared<Surface>(painted(*mesh, part.colors, *part.surface));
+    });
+  }
+  Surface& surface = *part.surface;
   const std::uint32_t material = material_index(surface, context);
+  if (mesh != nullptr && mesh->uvs.empty() && !is_isotropic(surface))
+    context.notice(element,
+                   "without texture coordinates the roughness of alphaU lies along the first edge "
+                   "of each triangle");
   with_location(element, [&] {
     if (radiance)
       context.builder.add_shape(std::move(geometry), material, *radiance);
@@ -147,7 +162,8 @@ void add_instance(Properties& properties, LoadContext& context) {
           if (!placed)
             properties.fail("toWorld",
                             "spheres must be scaled evenly, and cylinders across their axes");
-          add_shape(element, *std::move(placed), *part.surface, std::nullopt, context);
+          add_shape(element, {*std::move(placed), part.surface, part.colors}, std::nullopt,
+                    context);
         },
         part.geometry);
   }
@@ -168,7 +184,7 @@ void read_shape(const Element& element, LoadContext& context) {
   } else {
     ShapeParts shape = read_parts(properties, context, reader);
     for (ShapePart& part : shape.parts)
-      add_shape(element, std::move(part.geometry), *part.surface, shape.radiance, context);
+      add_shape(element, std::move(part), shape.radiance, context);
   }
   context.objects.define(element, NamedObjects::Other{});
 }

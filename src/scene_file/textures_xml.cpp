@@ -5,6 +5,7 @@
 #include <string>
 
 #include "color_xml.h"
+#include "vertex_colors.h"
 
 namespace driftlight {
 namespace {
@@ -97,12 +98,26 @@ Texture read_scaled(Properties& properties, LoadContext& context) {
   return *texture;
 }
 
+/// The colours of the mesh's vertices, in Mitsuba 0.6.
+Texture read_vertex_colors(Properties&, LoadContext&) { return vertex_color_texture(); }
+
+/// Likewise in Mitsuba 3, where meshes can have more.
+Texture read_mesh_attribute(Properties& properties, LoadContext&) {
+  properties.required_text("name");
+  properties.choice("name", "", {"vertex_color"});
+  Texture texture = vertex_color_texture();
+  scale(texture, Rgbd::Constant(properties.non_negative("scale", 1.0)));
+  return texture;
+}
+
 using TextureReader = Texture (*)(Properties&, LoadContext&);
-constexpr std::array<std::pair<std::string_view, TextureReader>, 4> kTextures{{
+constexpr std::array<std::pair<std::string_view, TextureReader>, 6> kTextures{{
     {"bitmap", &read_bitmap_texture},
     {"checkerboard", &read_checkerboard},
     {"gridtexture", &read_grid},
     {"scale", &read_scaled},
+    {"vertexcolors", &read_vertex_colors},
+    {"mesh_attribute", &read_mesh_attribute},
 }};
 
 }  // namespace
