@@ -135,7 +135,7 @@ TEST(Divergence, BlocksOfNestedJetsEqualWideOnes) {
       EXPECT_LT(norm(blocks - plain, q), 1e-6 * norm(plain, q)) << test.name;
     }
   }
-  for (const std::size_t d : {2, 4, 6, 8, 10}) EXPECT_GT(seen[d], 3) << d;
+  for (const std::size_t d : {2U, 4U, 6U, 8U, 10U}) EXPECT_GT(seen[d], 3) << d;
 }
 
 }  // namespace

@@ -42,23 +42,27 @@ TEST(GaussianStep, SampleHasItsDensity) {
         GaussianStep::langevin(gradient, m, 0.1, 0.3), GaussianStep::isotropic(d, 0.2)}) {
     const GaussianStep wide = GaussianStep::isotropic(d, 0.5);
     Moments weights;
-    std::vector<Moments> moments(2 * d);
-    std::vector<Moments> expected(2 * d);
+    const auto size = static_cast<std::size_t>(d);
+    std::vector<Moments> moments(2 * size);
+    std::vector<Moments> expected(2 * size);
     for (int i = 0; i < 40000; ++i) {
       const Vector x = wide.sample(rng);
       const double w = std::exp(step.log_density(x) - wide.log_density(x));
       weights.add(w);
       const Vector y = step.sample(rng);
-      for (int k = 0; k < d; ++k) {
-        moments[k].add(y[k]);
-        moments[d + k].add(y[k] * y[(k + 1) % d]);
-        expected[k].add(w * x[k]);
-        expected[d + k].add(w * x[k] * x[(k + 1) % d]);
+      for (std::size_t k = 0; k < size; ++k) {
+        const auto i0 = static_cast<int>(k);
+        const int i1 = (i0 + 1) % d;
+        moments[k].add(y[i0]);
+        moments[size + k].add(y[i0] * y[i1]);
+        expected[k].add(w * x[i0]);
+        expected[size + k].add(w * x[i0] * x[i1]);
       }
     }
     const double level = sidak(0.01, 3 * (2 * d + 1));
     EXPECT_GT(student_p_value(weights, 1.0), level) << weights.mean();
-    for (int k = 0; k < 2 * d; ++k) EXPECT_GT(welch_p_value(moments[k], expected[k]), level) << k;
+    for (std::size_t k = 0; k < 2 * size; ++k)
+      EXPECT_GT(welch_p_value(moments[k], expected[k]), level) << k;
   }
 }
 

@@ -99,11 +99,12 @@ class BadOption : public ::testing::TestWithParam<BadValue> {};
 TEST_P(BadOption, IsRefusedWithNameValueAndBound) {
   LangevinOptions options;
   const auto list = entries(options);
-  const auto& [name, value] = GetParam();
+  const std::string name = GetParam().name;
+  const std::string value = GetParam().value;
   const std::string before = find(list, name).get();
   const std::string message = option_error([&] { set_option(list, name, value); });
   EXPECT_NE(message.find(name), std::string::npos) << message;
-  EXPECT_NE(message.find("'" + std::string(value) + "'"), std::string::npos) << message;
+  EXPECT_NE(message.find("'" + value + "'"), std::string::npos) << message;
   EXPECT_NE(message.find(find(list, name).values), std::string::npos) << message;
   EXPECT_EQ(find(list, name).get(), before);
 }

@@ -288,7 +288,7 @@ TEST(Splitting, SharesAddUpToTheImage) {
     const float* value = &shares.values[pixel * channels];
     for (std::size_t c = 0; c < 3; ++c)
       ASSERT_FLOAT_EQ(value[c] + (value[3 + c] + value[6 + c]), result.image.rgb[3 * pixel + c]);
-    const Rgbd by_particles(value[6], value[7], value[8]);
+    const Rgbd by_particles = Eigen::Array3f(value[6], value[7], value[8]).cast<double>();
     ASSERT_TRUE(luminance(by_particles) == 0.0 || value[9] > 0.999F);
     particles += luminance(by_particles);
   }
