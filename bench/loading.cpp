@@ -2,7 +2,8 @@
 /// What loading a large mesh costs, by format: the time of load_scene over that of reading the
 /// bytes (of serialized files, inflating them) and building Embree's tree of the same mesh, and the
 /// peak of memory a triangle without Embree's own. `bench_loading [MILLIONS OF TRIANGLES]`, 3 by
-/// default. Each format has a process of its own, since peaks do not go down.
+/// default. Each figure is the median of 15 processes that do nothing else, since peaks do not go
+/// down, and memory is slow the first time that it is touched.
 #include <embree3/rtcore.h>
 #include <fmt/core.h>
 #include <sys/resource.h>
@@ -10,14 +11,17 @@
 #include <unistd.h>
 #include <zlib.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <iterator>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -156,6 +160,60 @@ double build_tree(const TriangleMesh& mesh, std::atomic<long long>& bytes) {
   });
 }
 
+/// What `work` returns in a process of its own; none if it fails.
+template <class Figures>
+std::optional<Figures> in_process(const std::function<Figures()>& work) {
+  std::array<int, 2> ends{};
+  if (pipe(ends.data()) != 0) return std::nullopt;
+  const pid_t child = fork();
+  if (child == 0) {
+    const Figures figures = work();
+    _exit(write(ends[1], &figures, sizeof figures) == sizeof figures ? 0 : 1);
+  }
+  close(ends[1]);
+  Figures figures;
+  const bool complete = read(ends[0], &figures, sizeof figures) == sizeof figures;
+  close(ends[0]);
+  waitpid(child, nullptr, 0);
+  return complete ? std::optional(figures) : std::nullopt;
+}
+
+struct Load {
+  double seconds, peak;
+};
+Load load(const std::filesystem::path& scene_file) {
+  const double before = peak_memory();
+  std::optional<LoadedScene> loaded;
+  const double taken = seconds([&] { loaded.emplace(load_scene(scene_file)); });
+  return {taken, peak_memory() - before};
+}
+
+struct Baseline {
+  double raw, build, embree_bytes;
+};
+Baseline baseline(const std::filesystem::path& file, std::size_t inflated_size,
+                  const TriangleMesh& mesh) {
+  const double raw = seconds([&] { read_raw(file, inflated_size); });
+  std::atomic<long long> bytes{0};
+  const double build = build_tree(mesh, bytes);
+  return {raw, build, static_cast<double>(bytes)};
+}
+
+/// Of each figure.
+template <class Figures>
+Figures median(std::vector<Figures> all) {
+  constexpr std::size_t kCount = sizeof(Figures) / sizeof(double);
+  std::array<double, kCount> result{};
+  for (std::size_t k = 0; k < kCount; ++k) {
+    std::vector<double> values;
+    for (const Figures& figures : all)
+      values.push_back(std::bit_cast<std::array<double, kCount>>(figures)[k]);
+    std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+    result[k] = values[values.size() / 2];
+  }
+  return std::bit_cast<Figures>(result);
+}
+
 void measure(const std::string& format, const std::filesystem::path& file,
              std::size_t inflated_size, const TriangleMesh& mesh) {
   const auto scene_file = file.parent_path() / (format + ".xml");
@@ -165,23 +223,23 @@ void measure(const std::string& format, const std::filesystem::path& file,
       R"(<rfilter type="box"/></film></sensor><emitter type="constant"/><shape type="{}">)"
       R"(<string name="filename" value="{}"/></shape></scene>)",
       format, file.filename().string());
-  const double before = peak_memory();
-  double load = 0;
-  double peak = 0;
-  {
-    std::optional<LoadedScene> loaded;
-    load = seconds([&] { loaded.emplace(load_scene(scene_file)); });
-    peak = peak_memory() - before;
+  std::vector<Load> loads;
+  std::vector<Baseline> baselines;
+  for (int i = 0; i < 15; ++i) {
+    const auto loaded = in_process<Load>([&] { return load(scene_file); });
+    const auto base = in_process<Baseline>([&] { return baseline(file, inflated_size, mesh); });
+    if (!loaded || !base) return fmt::print("{}: failed\n", format);
+    loads.push_back(*loaded);
+    baselines.push_back(*base);
   }
-  const double raw = seconds([&] { read_raw(file, inflated_size); });
-  std::atomic<long long> embree_bytes{0};
-  const double build = build_tree(mesh, embree_bytes);
+  const Load l = median(loads);
+  const Baseline b = median(baselines);
   const auto triangles = static_cast<double>(mesh.triangles.size());
   fmt::print(
       "{:10} {:6.0f} MB  raw read {:.3f} s  Embree {:.3f} s  load {:.3f} s, {:.2f} times  "
       "{:.0f} bytes a triangle, {:.0f} of them Embree's in the end\n",
-      format, static_cast<double>(std::filesystem::file_size(file)) / 1e6, raw, build, load,
-      load / (raw + build), peak / triangles, static_cast<double>(embree_bytes) / triangles);
+      format, static_cast<double>(std::filesystem::file_size(file)) / 1e6, b.raw, b.build,
+      l.seconds, l.seconds / (b.raw + b.build), l.peak / triangles, b.embree_bytes / triangles);
 }
 
 }  // namespace
@@ -202,16 +260,7 @@ int main(int argc, char** argv) {
   for (const auto& [format, write] : formats) {
     const auto file = folder / ("waves." + format);
     std::ofstream(file, std::ios::binary) << write(mesh);
-    std::fflush(stdout);
-    const pid_t child = fork();
-    if (child == 0) {
-      measure(format, file, inflated_size, mesh);
-      std::fflush(stdout);
-      _exit(0);
-    }
-    int status = 0;
-    waitpid(child, &status, 0);
-    if (status != 0) fmt::print("{}: failed\n", format);
+    measure(format, file, inflated_size, mesh);
   }
   std::filesystem::remove_all(folder);
   return 0;

@@ -21,12 +21,19 @@ Vec3d face_normal(const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& 
   return (position(mesh, triangle, 1) - a).cross(position(mesh, triangle, 2) - a).normalized();
 }
 
-double corner_angle(const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& triangle,
-                    std::size_t corner) {
-  const Vec3d p = position(mesh, triangle, corner);
-  const Vec3d a = position(mesh, triangle, (corner + 1) % 3) - p;
-  const Vec3d b = position(mesh, triangle, (corner + 2) % 3) - p;
-  return std::atan2(a.cross(b).norm(), a.dot(b));
+/// The unit normal times the angle at each corner; zero for triangles without area.
+std::array<Vec3d, 3> weighted_normals(const TriangleMesh& mesh,
+                                      const std::array<std::uint32_t, 3>& triangle) {
+  const Vec3d p = position(mesh, triangle, 0);
+  const Vec3d a = position(mesh, triangle, 1) - p;
+  const Vec3d b = position(mesh, triangle, 2) - p;
+  const Vec3d cross = a.cross(b);
+  const double length = cross.norm();  // the product of two edges and the sine between them
+  if (length == 0.0) return {Vec3d::Zero(), Vec3d::Zero(), Vec3d::Zero()};
+  const double at_p = std::atan2(length, a.dot(b));
+  const double at_a = std::atan2(length, a.dot(a - b));
+  const Vec3d normal = cross / length;
+  return {at_p * normal, at_a * normal, (kPi - at_p - at_a) * normal};
 }
 
 template <class Vector>
@@ -37,9 +44,8 @@ bool all_finite(const std::vector<Vector>& vectors) {
 void compute_smooth_normals(TriangleMesh& mesh) {
   std::vector<Vec3d> sums(mesh.positions.size(), Vec3d::Zero());
   for (const auto& triangle : mesh.triangles) {
-    const Vec3d normal = face_normal(mesh, triangle);
-    for (std::size_t corner = 0; corner < 3; ++corner)
-      sums[triangle[corner]] += corner_angle(mesh, triangle, corner) * normal;
+    const std::array<Vec3d, 3> normals = weighted_normals(mesh, triangle);
+    for (std::size_t corner = 0; corner < 3; ++corner) sums[triangle[corner]] += normals[corner];
   }
   mesh.normals.clear();
   for (const Vec3d& sum : sums) {

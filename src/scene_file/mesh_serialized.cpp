@@ -8,6 +8,7 @@
 #include <cstring>
 #include <fstream>
 #include <string>
+#include <type_traits>
 
 #include "driftlight/error.h"
 
@@ -135,6 +136,7 @@ std::vector<Eigen::Matrix<float, N, 1>> read_vectors(InflateStream& stream, std:
   stream.expect(count, N * sizeof(File));
   std::vector<Eigen::Matrix<File, N, 1>> values(count);
   stream.read(values.data(), count * N * sizeof(File));
+  if constexpr (std::is_same_v<File, float>) return values;
   std::vector<Eigen::Matrix<float, N, 1>> result;
   result.reserve(count);
   for (const auto& value : values) result.push_back(value.template cast<float>());
