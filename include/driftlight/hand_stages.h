@@ -1,21 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Derivatives derived by hand: the stages (linearization.h). The differentials of hand_rules.h
 /// forward, in all local columns at once, and through them the residuals, in the order of
-/// ConstraintVisitor:
-///   slopes  r = m - n, m = h / h.n, h = w_i + e w_o:
-///           dr = (dh - m (n.dh)) / h.n - m (m.dn) - dn                                    (H19)
-///           along the tangent and across it  r_u = (P.m - P.n) / L,  r_v = (n x P).m / L:
-///           dr_u = (m.dP + P.dm - P.dn - n.dP - r_u dL) / L,  L dL = P.dP - P.n (P.dn + n.dP)
-///           dr_v = (dn.(P x m) + dP.(m x n) + (n x P).dm - r_v dL) / L                    (H45)
-///   diffuse r = w_o - c_o n:  dr = dw_o - c_o dn - n dc_o                                 (H20)
-///   Phong   r = w_o - mirror: dr = dw_o - (2 c_i dn + 2 n dc_i - dw_i)                    (H21)
+/// ConstraintVisitor: those of scattering are of hand_residuals.h,
 ///   film    x = (right.v) / (2 a f), f = forward.v:
 ///           dx = (right - (right.v) forward / f) / (2 a f) . dv                           (H22)
 ///   lens    from the point l of a lens in focus at F also right.(l - o) / (2 a F):
 ///           dx += right / (2 a F) . dl;  its own residual is (l - o) / R                  (H42)
 ///   spot    r = w_o: with its share of (H18)
-///   coating r of what is below, by w' = w / eta + (c' - c / eta) n with c' of (H39):
-///           dw' = dw / eta + n (c / (eta^2 c') - 1 / eta) dc + (c' - c / eta) dn         (H40)
 ///   emission, of an area r = v - c n, c = n.v: (H20);  of a spot r = v;  the point by its own
 ///   residuals, on the disk across parallel light r = y / R                                (H26)
 ///   blurred lamp, y = u + t v at the ray's nearest point, widths fixed:
@@ -24,38 +15,9 @@
 /// both its ends.
 #pragma once
 
-#include "driftlight/hand_path.h"
+#include "driftlight/hand_residuals.h"
 
 namespace driftlight::hand {
-
-/// The differential of a vector, in all local columns.
-struct Columns {
-  LocalRow x, y, z;
-
-  static Columns zero() { return {LocalRow::Zero(), LocalRow::Zero(), LocalRow::Zero()}; }
-  void set(int column, const Vec3d& v) {
-    x[column] = v.x();
-    y[column] = v.y();
-    z[column] = v.z();
-  }
-};
-
-inline LocalRow dot(const Vec3d& a, const Columns& b) {
-  return a.x() * b.x + a.y() * b.y + a.z() * b.z;
-}
-inline Columns cross(const Vec3d& a, const Columns& b) {
-  return {a.y() * b.z - a.z() * b.y, a.z() * b.x - a.x() * b.z, a.x() * b.y - a.y() * b.x};
-}
-inline Columns outer(const Vec3d& a, const LocalRow& row) {
-  return {a.x() * row, a.y() * row, a.z() * row};
-}
-inline Columns operator*(double k, const Columns& a) { return {k * a.x, k * a.y, k * a.z}; }
-inline Columns operator+(const Columns& a, const Columns& b) {
-  return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-inline Columns operator-(const Columns& a, const Columns& b) {
-  return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
 
 template <class Rules>
 class StageSweep : RecordedPath<Rules> {
@@ -71,12 +33,11 @@ class StageSweep : RecordedPath<Rules> {
  public:
   StageSweep(const Scene& scene, const PathTopology& topology, const Chart& chart,
              const Recorder<Rules>& path, Linearization& result)
-      : Base(scene, topology, chart, path, result) {}
+      : Base(scene, topology, chart, path, result), rows_(result) {}
 
   /// Stages and residual rows.
   void stages() {
     result_.stage_count = 0;
-    row_count_ = 0;
     if (topology_.has_light_side()) return stages_of_both_sides();
     begin_at_sensor();
     for (int k = 0; k < path_.count; ++k) {
@@ -108,16 +69,8 @@ class StageSweep : RecordedPath<Rules> {
     Columns dx = Columns::zero();
     Columns dwi = Columns::zero();
     Columns dn = Columns::zero();
-    Columns dP = Columns::zero();
+    Columns dp = Columns::zero();
   };
-  /// Those of scattering there.
-  struct Scattered {
-    const Columns& dwi;
-    const Columns& dwo;
-    const Columns& dn;
-    const Columns& dP;
-  };
-
   /// The next block, in the columns of u.
   Columns block_columns() const {
     Columns d = Columns::zero();
@@ -140,7 +93,7 @@ class StageSweep : RecordedPath<Rules> {
   /// (H42): the point on the lens, if there is one; its differential from here on.
   Columns begin_at_lens() {
     if (!topology_.has_lens) return Columns::zero();
-    add(2.0 / (3.0 * scene_.camera().lens_radius), block_columns());
+    rows_.add(2.0 / (3.0 * scene_.camera().lens_radius), block_columns());
     return begin_at_point();
   }
 
@@ -166,7 +119,7 @@ class StageSweep : RecordedPath<Rules> {
     at.dwi.set(columns_.omega, -ray_.omega_t);
     at.dwi.set(columns_.omega + 1, -ray_.omega_b);
     at.dn = normal(x.surface, at.dx);
-    if (x.shape->anisotropic) at.dP = cross(x.field.turn, at.dx) + x.field.spread * at.dx;
+    if (x.shape->anisotropic) at.dp = cross(x.field.turn, at.dx) + x.field.spread * at.dx;
     return at;
   }
 
@@ -245,7 +198,7 @@ class StageSweep : RecordedPath<Rules> {
       if (topology_.end == PathEnd::AreaEmission)
         position(this->emitter_shape(), dy);
       else
-        add(2.0 / (3.0 * scene_.radius()), dy);
+        rows_.add(2.0 / (3.0 * scene_.radius()), dy);
       dy = begin_at_point();
     }
     if (topology_.end == PathEnd::DirectionalEmission) return;
@@ -255,9 +208,9 @@ class StageSweep : RecordedPath<Rules> {
     if (topology_.end == PathEnd::AreaEmission) {
       normal = path_.normal;
       dn = this->emitter_curvature() * dy;
-      tangential(normal, v, normal.dot(v), dv, dn, 1.0);
+      rows_.tangential(normal, v, normal.dot(v), dv, dn, 1.0);
     } else if (const SpotEmitter* light = this->spot()) {
-      add(1.0 / (3.0 * light->width()), dv);
+      rows_.add(1.0 / (3.0 * light->width()), dv);
     }
     depart_freely(normal, dy);
   }
@@ -295,17 +248,9 @@ class StageSweep : RecordedPath<Rules> {
     Stage& stage = result_.stages[static_cast<std::size_t>(result_.stage_count++)];
     stage.kind = kind;
     stage.has_block = has_block;
-    stage.rows_end = row_count_;
+    stage.rows_end = rows_.count();
     return stage;
   }
-  void add(const LocalRow& row) { result_.rows.row(row_count_++) = row; }
-  /// `factor` is sqrt(w) / 3.
-  void add(double factor, const Columns& dr) {
-    add(factor * dr.x);
-    add(factor * dr.y);
-    add(factor * dr.z);
-  }
-
   Stage::Map map(const Columns& d, const Vec3d& t, const Vec3d& b) const {
     Stage::Map m;
     m.row(0) = dot(t, d).template segment<4>(columns_.xi).matrix();
@@ -348,139 +293,21 @@ class StageSweep : RecordedPath<Rules> {
     const Vec3d x = camera.right - camera.right.dot(v) / f * camera.forward;
     const Vec3d y = camera.up - camera.up.dot(v) / f * camera.forward;
     const double shift = f / camera.focus_depth;
-    add(factor * 0.5 / (camera.half_width * f) * (dot(x, dv) + shift * dot(camera.right, lens)));
-    add(-factor * 0.5 / (camera.half_height * f) * (dot(y, dv) + shift * dot(camera.up, lens)));
+    rows_.add(factor * 0.5 / (camera.half_width * f) *
+              (dot(x, dv) + shift * dot(camera.right, lens)));
+    rows_.add(-factor * 0.5 / (camera.half_height * f) *
+              (dot(y, dv) + shift * dot(camera.up, lens)));
   }
 
   void position(const Shape& shape, const Columns& dx) {
     for (int i = 0; i < 3; ++i) {
       const Vec3d row = shape.extent.whitening.row(i) / 3.0;
-      if (!row.isZero(0.0)) add(dot(row, dx));
+      if (!row.isZero(0.0)) rows_.add(dot(row, dx));
     }
   }
 
   void residuals(const Vertex& x, const Arrival& at, const Columns& dwo) {
-    constrain(*x.bsdf, x, {at.dwi, dwo, at.dn, at.dP}, 1.0);
-  }
-
-  /// (H19)
-  void slopes(const Microfacets& m, double e, const Vertex& x, const Scattered& d, double share) {
-    const double hn = x.cos_i + e * x.cos_o;
-    const Vec3d h = (x.wi + e * x.wo) / hn;
-    const Columns dh = d.dwi + e * d.dwo;
-    const LocalRow along = dot(x.n_s, dh) / hn + dot(h, d.dn);
-    const Columns change = (1.0 / hn) * dh - outer(h, along);
-    if (!m.is_isotropic()) return slopes_by_axis(m, x, h, change, d, share);
-    const double t = (h - x.n_s).squaredNorm() / (m.alpha_u * m.alpha_u);
-    add(std::sqrt(share / m.slope_variance(m.alpha_u, t)) / 3.0, change - d.dn);
-  }
-  /// (H45), with m of (H19) and its differential.
-  void slopes_by_axis(const Microfacets& microfacets, const Vertex& x, const Vec3d& m,
-                      const Columns& dm, const Scattered& d, double share) {
-    const Vec3d& P = x.tangent;
-    const Vec3d across = x.n_s.cross(P);
-    const double lift = x.n_s.dot(P);
-    const double inverse = 1.0 / std::sqrt(P.squaredNorm() - lift * lift);
-    const double r_u = (P.dot(m) - lift) * inverse;
-    const double r_v = across.dot(m) * inverse;
-    const LocalRow d_lift = dot(P, d.dn) + dot(x.n_s, d.dP);
-    const LocalRow d_length = inverse * (dot(P, d.dP) - lift * d_lift);
-    const LocalRow d_u = dot(m, d.dP) + dot(P, dm) - d_lift - r_u * d_length;
-    const LocalRow d_v = dot(Vec3d(P.cross(m)), d.dn) + dot(Vec3d(m.cross(x.n_s)), d.dP) +
-                         dot(across, dm) - r_v * d_length;
-    const double u = r_u / microfacets.alpha_u;
-    const double v = r_v / microfacets.alpha_v;
-    const auto factor = [&](double alpha) {
-      return inverse / 3.0 * std::sqrt(share / microfacets.slope_variance(alpha, u * u + v * v));
-    };
-    add(factor(microfacets.alpha_u) * d_u);
-    add(factor(microfacets.alpha_v) * d_v);
-  }
-  /// (H20)
-  void diffuse(const Vertex& x, const Scattered& d, double share) {
-    tangential(x.n_s, x.wo, x.cos_o, d.dwo, d.dn, share);
-  }
-  void tangential(const Vec3d& n, const Vec3d& v, double cosine, const Columns& dv,
-                  const Columns& dn, double share) {
-    const double factor = std::sqrt(share) / (3.0 * std::abs(cosine));
-    const LocalRow d_cos = dot(n, dv) + dot(v, dn);
-    add(factor, dv - cosine * dn - outer(n, d_cos));
-  }
-
-  // `share` is that of the BSDF in a blend.
-
-  void constrain(const Bsdf& bsdf, const Vertex& x, const Scattered& d, double share) {
-    std::visit([&](const auto& b) { constrain(b, x, d, share); }, bsdf);
-  }
-  void constrain(const Diffuse&, const Vertex& x, const Scattered& d, double share) {
-    diffuse(x, d, share);
-  }
-  void constrain(const Conductor&, const Vertex&, const Scattered&, double) {}
-  void constrain(const Dielectric&, const Vertex&, const Scattered&, double) {}
-  void constrain(const RoughConductor& b, const Vertex& x, const Scattered& d, double share) {
-    slopes(b.microfacets, 1.0, x, d, share);
-  }
-  void constrain(const RoughDielectric& b, const Vertex& x, const Scattered& d, double share) {
-    const double eta = x.cos_i > 0.0 ? b.eta : 1.0 / b.eta;
-    slopes(b.microfacets, x.scattering == Scattering::Reflection ? 1.0 : eta, x, d, share);
-  }
-  /// Two lobes; `add_glossy` takes the share of its one.
-  template <class B, class AddGlossy>
-  void add_lobes(const B& b, const Vertex& x, const Scattered& d, double share,
-                 const AddGlossy& add_glossy) {
-    const auto lobes = detail::lobes<double>(b, {x.n_s, x.uv, x.tangent}, x.wi, x.wo);
-    if (!lobes.any()) return;
-    const double glossy = lobes.glossy_share();
-    if (glossy > 0.0) add_glossy(share * glossy);
-    if (glossy < 1.0) diffuse(x, d, share * (1.0 - glossy));
-  }
-  /// (H21)
-  void constrain(const Phong& b, const Vertex& x, const Scattered& d, double share) {
-    add_lobes(b, x, d, share, [&](double part) {
-      const LocalRow d_cos = dot(x.wi, d.dn) + dot(x.n_s, d.dwi);
-      const Columns mirror = 2.0 * x.cos_i * d.dn + outer(x.n_s, 2.0 * d_cos) - d.dwi;
-      add(std::sqrt(part * b.exponent) / 3.0, d.dwo - mirror);
-    });
-  }
-  /// (H19)
-  void constrain(const Ward& b, const Vertex& x, const Scattered& d, double share) {
-    add_lobes(b, x, d, share, [&](double part) { slopes(b.microfacets(), 1.0, x, d, part); });
-  }
-  void constrain(const RoughPlastic& b, const Vertex& x, const Scattered& d, double share) {
-    add_lobes(b, x, d, share, [&](double part) { slopes(b.microfacets, 1.0, x, d, part); });
-  }
-
-  void constrain(const ThinDielectric&, const Vertex&, const Scattered&, double) {}
-  void constrain(const Plastic&, const Vertex& x, const Scattered& d, double share) {
-    diffuse(x, d, share);
-  }
-  void constrain(const Mask& b, const Vertex& x, const Scattered& d, double share) {
-    if (b.nested != nullptr) constrain(b.nested->bsdf, x, d, share);
-  }
-  /// (H40)
-  static Columns inner(const Coating& b, const Vec3d& n, const Vec3d& w, double cosine,
-                       const Columns& dw, const Columns& dn) {
-    const double within = b.inner_cosine(cosine);
-    const LocalRow d_cos = dot(w, dn) + dot(n, dw);
-    const double slope = cosine / (b.eta * b.eta * within) - 1.0 / b.eta;
-    return (1.0 / b.eta) * dw + outer(n, slope * d_cos) + (within - cosine / b.eta) * dn;
-  }
-  void constrain(const Coating& b, const Vertex& x, const Scattered& d, double share) {
-    Vertex below = x;
-    below.wi = b.inner(x.n_s, x.wi, x.cos_i);
-    below.wo = b.inner(x.n_s, x.wo, x.cos_o);
-    below.cos_i = b.inner_cosine(x.cos_i);
-    below.cos_o = b.inner_cosine(x.cos_o);
-    below.io = below.wi.dot(below.wo);
-    constrain(b.nested->bsdf, below,
-              {inner(b, x.n_s, x.wi, x.cos_i, d.dwi, d.dn),
-               inner(b, x.n_s, x.wo, x.cos_o, d.dwo, d.dn), d.dn, d.dP},
-              share);
-  }
-  void constrain(const Blend& b, const Vertex& x, const Scattered& d, double share) {
-    const auto of = detail::blend_shares<double>(b, {x.n_s, x.uv, x.tangent}, x.wi, x.wo);
-    if (of.first > 0.0) constrain(b.first->bsdf, x, d, share * of.first);
-    if (of.second > 0.0) constrain(b.second->bsdf, x, d, share * of.second);
+    rows_.scatter(x, {at.dwi, dwo, at.dn, at.dp});
   }
 
   /// w_o = e / r with e = y - x: (H18)
@@ -493,7 +320,7 @@ class StageSweep : RecordedPath<Rules> {
     const Columns dwo = (1.0 / r) * (de - outer(x.wo, dot(x.wo, de)));
     residuals(x, at, dwo);
     if (area) position(this->emitter_shape(), dy);
-    if (const SpotEmitter* light = this->spot()) add(1.0 / (3.0 * light->width()), dwo);
+    if (const SpotEmitter* light = this->spot()) rows_.add(1.0 / (3.0 * light->width()), dwo);
   }
 
   /// The emitter that is hit, or the environment.
@@ -504,7 +331,7 @@ class StageSweep : RecordedPath<Rules> {
       Columns dv = Columns::zero();
       dv.set(columns_.omega, ray_.omega_t);
       dv.set(columns_.omega + 1, ray_.omega_b);
-      add(std::sqrt(map->precision(path_.last_v)) / 3.0, dv);
+      rows_.add(std::sqrt(map->precision(path_.last_v)) / 3.0, dv);
       return;
     }
     if (const BlurredAreaEmitter* lamp = this->blurred()) return blurred_end(*lamp);
@@ -530,13 +357,13 @@ class StageSweep : RecordedPath<Rules> {
     const Columns dy = du + t * dv + outer(ray.direction, dot(t_u, du) + dot(t_v, dv));
     const Vec3d variance = lamp.approach(ray).variance;
     for (int i = 0; i < 3; ++i)
-      add(1.0 / (3.0 * std::sqrt(variance[i])) * dot(Vec3d(lamp.axes().row(i)), dy));
+      rows_.add(1.0 / (3.0 * std::sqrt(variance[i])) * dot(Vec3d(lamp.axes().row(i)), dy));
   }
 
   LocalColumns columns_ = kSensorColumns;
   Tangents ray_;
   int block_ = 0;  ///< the next
-  int row_count_ = 0;
+  ResidualRows rows_;
 };
 
 }  // namespace driftlight::hand

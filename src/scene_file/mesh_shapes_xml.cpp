@@ -122,7 +122,8 @@ std::vector<ShapePart> read_ply_shape(Properties& properties, LoadContext& conte
                                                      name, join(file.unused)));
   if (is_srgb)
     for (Eigen::Vector3f& color : file.colors)
-      color = color.unaryExpr([](float c) { return static_cast<float>(srgb_to_linear(c)); });
+      color = color.unaryExpr(
+          [](float c) { return static_cast<float>(srgb_to_linear(static_cast<double>(c))); });
   return {finish_colored(properties, std::move(file), Mirrored::TurnsInsideOut, context)};
 }
 

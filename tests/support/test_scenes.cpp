@@ -424,8 +424,9 @@ Scene lens(bool with_caustics) {
                   make.one_sided(Phong{textured(8, 0.2, 0.6), gray(0.3), 15}));
   make->add_shape(quad({-3, 0, -2}, {6, 0, 0}, {0, 3, 0}), plain);
   make->add_shape(sphere_at({-0.7, 0.45, 1.4}, 0.45),
-                  make.one_sided(RoughConductor{ggx(0.25), kGoldEta, kGoldK, gray(1.0)}));
-  make->add_shape(round_mesh({0.5, 0.5, 0.0}, 0.5, 8), plain);
+                  make.one_sided(RoughConductor{ggx(0.4, 0.15), kGoldEta, kGoldK, gray(1.0)}));
+  make->add_shape(round_mesh({0.5, 0.5, 0.0}, 0.5, 8),
+                  make.one_sided(RoughConductor{{Distribution::Phong, 0.2, 0.5}}));
   if (with_caustics) {
     make->add_shape(sphere_at({0.3, 0.3, 2.0}, 0.3),
                     make.one_sided(Dielectric{kGlass, gray(1.0), gray(1.0)}));
