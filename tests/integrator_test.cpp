@@ -204,7 +204,7 @@ class SharedReference : public testing::Test {
 TEST_F(SharedReference, CboxGlossy) {
   ASSERT_NO_FATAL_FAILURE(load("cbox_glossy"));
   if (IsSkipped()) return;
-  const Image image = render(192);
+  const Image image = render(96);
   EXPECT_NEAR(median(block_ratios(image)), 1.0, 0.01);
   EXPECT_NEAR(difference(image, reference_).mean, 1.0, 0.01);
 }
@@ -240,7 +240,7 @@ TEST_F(SharedReference, CboxUpToTheColourOfItsLight) {
 TEST_F(SharedReference, Torus) {
   ASSERT_NO_FATAL_FAILURE(load("torus"));
   if (IsSkipped()) return;
-  EXPECT_NEAR(median(block_ratios(render(300))), 1.0, 0.01);
+  EXPECT_NEAR(median(block_ratios(render(150))), 1.0, 0.01);
 }
 
 }  // namespace
