@@ -234,6 +234,11 @@ TEST(VertexColors, AreRefusedWhereTheyCannotBe) {
       "radiance");
   expect_contains(
       error(colored_shape(
+          diffuse +
+          R"(<emitter type="area"><texture name="radiance" type="checkerboard"/></emitter>)")),
+      "textured radiance");
+  expect_contains(
+      error(colored_shape(
                 R"(<bsdf type="diffuse"><texture name="reflectance" type="mesh_attribute">
                    <string name="name" value="face_color"/></texture></bsdf>)"),
             "3.0.0"),

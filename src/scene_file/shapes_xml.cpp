@@ -87,6 +87,8 @@ void add_shape(const Element& element, ShapePart part, const std::optional<Textu
   if (looks_at_vertex_colors(*part.surface)) {
     if (part.colors.empty())
       element.fail("the shape has no vertex colours, which a texture of its bsdf looks at");
+    if (radiance && !radiance->is_constant())
+      element.fail("vertex colours cannot be beside a textured radiance");
     part.surface = with_location(element, [&] {
       return std::make_shared<Surface>(painted(*mesh, part.colors, *part.surface));
     });
