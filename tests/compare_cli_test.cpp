@@ -308,8 +308,9 @@ TEST_F(CompareCli, StudiesTheTermsOfTheStep) {
 <rotate x="1" angle="-90"/><translate y="-1"/></transform></shape></scene>)");
   std::ofstream(folder() / "scene.xml") << floor;
   render_reference();
-  const Outcome outcome = compare({"--study", "terms", "--reference", "reference.exr", "--time",
-                                   "0.05", "--mutations-per-pixel", "4", "--runs", "2"});
+  const Outcome outcome =
+      compare({"--study", "terms:bootstrap=5000", "--reference", "reference.exr", "--time", "0.05",
+               "--mutations-per-pixel", "4", "--runs", "2"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(files("out"), (std::set<std::string>{"equal_mutations", "equal_time", "terms.csv"}));
   std::set<std::string> kinds;
@@ -321,6 +322,7 @@ TEST_F(CompareCli, StudiesTheTermsOfTheStep) {
       EXPECT_TRUE(contains(outcome.out, integrator.at("name"))) << outcome.out;
       const json& options = integrator.at("options");
       EXPECT_EQ(options.at("mode"), "chain");
+      EXPECT_EQ(options.at("bootstrap"), 5000);
       kinds.insert(options.at("preconditioner").dump() + options.at("drift").dump() +
                    options.at("safety").dump() + options.at("time_step_cap").dump());
     }
@@ -350,6 +352,10 @@ TEST_F(CompareCli, MistakesAreNamedBeforeAnythingIsRendered) {
       {{"--study", "terms", "--integrators", "path"}, {"either", "--integrators", "--study"}},
       {{"--study", "colours"}, {"'colours'", "terms"}},
       {{"--study", "terms", "--spp", "4"}, {"--study", "--spp"}},
+      {{"--study", "terms:drift=none"}, {"--study", "'drift'", "itself"}},
+      {{"--study", "terms:mode=splitting"}, {"--study", "'mode'", "itself"}},
+      {{"--study", "terms:bootstrap"}, {"terms", "--study", "'bootstrap'", "name=value"}},
+      {{"--study", "terms:bootstarp=1"}, {"'bootstarp'", "bootstrap"}},
       {{"--integrators", "photons"}, {"'photons'", "langevin", "path", "bdpt", "light"}},
       {{"--integrators", "path,"}, {"unknown integrator ''"}},
       {{"--integrators", "path,bdpt,path"}, {"'path'", "twice"}},

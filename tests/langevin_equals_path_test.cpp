@@ -30,18 +30,18 @@ struct Work {
 const std::map<std::string, Work>& works() {
   static const std::map<std::string, Work> kWorks{
       {"furnace_sphere", {64, 200, 50000, 0.01}},
-      {"cornell_glossy", {300, 300, 100000, 0.04}},
+      {"cornell_glossy", {150, 150, 50000, 0.04}},
       {"glass_caustic", {1200, 400, 1000000, 0.05, 0.5}},
-      {"small_hole", {400, 400, 200000, 0.08}},
-      {"glossy_chain", {600, 300, 400000, 0.12}},
-      {"door_ajar", {200, 150, 200000, 0.12}},
-      {"ring_caustic", {300, 200, 200000, 0.04}},
+      {"small_hole", {200, 400, 100000, 0.08}},
+      {"glossy_chain", {300, 300, 200000, 0.12}},
+      {"door_ajar", {120, 150, 200000, 0.12}},
+      {"ring_caustic", {200, 150, 100000, 0.04}},
       {"limelight", {256, 200, 100000, 0.02}},
-      {"coated", {256, 200, 200000, 0.05}},
-      {"plan", {256, 200, 200000, 0.05}},
-      {"lens", {256, 200, 200000, 0.05}},
-      {"sun_pane", {600, 200, 100000, 0.05}},
-      {"lamp_in_glass", {1500, 200, 200000, 0.12}}};
+      {"coated", {256, 200, 100000, 0.05}},
+      {"plan", {256, 200, 100000, 0.05}},
+      {"lens", {256, 200, 100000, 0.05}},
+      {"sun_pane", {300, 200, 100000, 0.05}},
+      {"lamp_in_glass", {750, 200, 200000, 0.12}}};
   return kWorks;
 }
 
@@ -324,7 +324,7 @@ TEST(LangevinEqualsBdpt, PointCaustic) {
   const auto traced = tiles_over_runs([&](std::uint64_t seed) {
     RenderOptions render;
     render.seed = 1000 + seed;
-    return render_bdpt(loaded.scene, BdptOptions{depth}, render, 300).image;
+    return render_bdpt(loaded.scene, BdptOptions{depth}, render, 150).image;
   });
   for (const Drift drift : {Drift::None, Drift::Full}) {
     LangevinOptions options;
@@ -332,11 +332,11 @@ TEST(LangevinEqualsBdpt, PointCaustic) {
     options.phase_space = PhaseSpace::Bidirectional;
     options.kernel.drift = drift;
     options.max_depth = depth;
-    options.bootstrap = 200000;
+    options.bootstrap = 100000;
     const auto sampled = tiles_over_runs([&](std::uint64_t seed) {
       RenderOptions render;
       render.seed = seed;
-      return render_langevin(loaded.scene, options, render, 300).image;
+      return render_langevin(loaded.scene, options, render, 150).image;
     });
     test::expect_equal_tiles("point_caustic", sampled, traced, 0.03);
   }

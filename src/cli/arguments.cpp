@@ -151,8 +151,9 @@ void declare_compare(CLI::App& app, Raw& raw) {
       ->type_name("NAME[:OPTION=VALUE]..,..");
   app.add_option("--study", raw.study,
                  "terms: instead of --integrators, langevin with mode=chain and each "
-                 "preconditioner, drift and time-step rule, at equal time and at equal mutations")
-      ->type_name("STUDY");
+                 "preconditioner, drift and time-step rule, at equal time and at equal mutations; "
+                 "with options that all of them have if need be, as in terms:bootstrap=100000")
+      ->type_name("STUDY[:OPTION=VALUE]..");
   app.add_option("--reference", raw.reference,
                  "image to measure errors against; without it they follow from the spread between "
                  "runs alone")
@@ -317,14 +318,21 @@ std::vector<std::string> split(const std::string& text, char separator) {
   return parts;
 }
 
+/// The settings after the first of the parts "NAME:OPTION=VALUE:.." of the argument of a flag.
+Settings parse_settings(std::string_view flag, const std::vector<std::string>& parts) {
+  Settings settings;
+  for (std::size_t i = 1; i < parts.size(); ++i)
+    settings.push_back(
+        split_setting(fmt::format("the setting of {} in {}", parts[0], flag), parts[i]));
+  return settings;
+}
+
 /// "langevin:mode=chain:scale=0.2"
 IntegratorChoice parse_choice(const std::string& text) {
   const std::vector<std::string> parts = split(text, ':');
-  IntegratorChoice choice{.name = text, .integrator = parse_integrator(parts[0]), .settings = {}};
-  for (std::size_t i = 1; i < parts.size(); ++i)
-    choice.settings.push_back(
-        split_setting(fmt::format("the setting of {} in --integrators", parts[0]), parts[i]));
-  return choice;
+  return {.name = text,
+          .integrator = parse_integrator(parts[0]),
+          .settings = parse_settings("--integrators", parts)};
 }
 
 constexpr double kCompareSeconds = 10;
@@ -332,8 +340,9 @@ constexpr double kStudyMutations = 100;
 
 /// Its integrators, at equal time and at equal mutations.
 void set_study(const Raw& raw, CompareCommand& command) {
-  if (raw.study != "terms")
-    throw UsageError(fmt::format("unknown study '{}'; the study is terms", raw.study));
+  const std::vector<std::string> parts = split(raw.study, ':');
+  if (parts[0] != "terms")
+    throw UsageError(fmt::format("unknown study '{}'; the study is terms", parts[0]));
   if (raw.samples_per_pixel)
     throw UsageError("--study takes --time and --mutations-per-pixel, not --spp");
   const Work given = parse_work(raw);
@@ -341,7 +350,7 @@ void set_study(const Raw& raw, CompareCommand& command) {
   equal_time.time = given.time.value_or(kCompareSeconds);
   Work equal_mutations;
   equal_mutations.mutations_per_pixel = given.mutations_per_pixel.value_or(kStudyMutations);
-  command.integrators = terms_of_the_step();
+  command.integrators = terms_of_the_step(parse_settings("--study", parts));
   command.budgets = {{"equal_time", equal_time}, {"equal_mutations", equal_mutations}};
 }
 

@@ -3,8 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <string>
 #include <utility>
 
 namespace driftlight::cli {
@@ -39,6 +41,19 @@ const std::array<Term, 2>& time_steps() {
   static const std::array<Term, 2> terms{
       {{"default", {}}, {"careful", {{"safety", "10"}, {"time_step_cap", "0.01"}}}}};
   return terms;
+}
+
+/// Whether the study sets it.
+bool is_studied(const std::string& option) {
+  const auto sets = [&](const Term& term) {
+    return std::any_of(term.settings.begin(), term.settings.end(),
+                       [&](const auto& setting) { return setting.first == option; });
+  };
+  const auto any_sets = [&](const auto& terms) {
+    return std::any_of(terms.begin(), terms.end(), sets);
+  };
+  return option == "mode" || any_sets(preconditioners()) || any_sets(drifts()) ||
+         any_sets(time_steps());
 }
 
 /// What both tables show of one integrator.
@@ -77,7 +92,10 @@ std::vector<Line> lines_of(const Json& equal_time, const Json& equal_mutations) 
 
 }  // namespace
 
-std::vector<IntegratorChoice> terms_of_the_step() {
+std::vector<IntegratorChoice> terms_of_the_step(const Settings& shared) {
+  for (const auto& [option, value] : shared)
+    if (is_studied(option))
+      throw UsageError(fmt::format("--study terms sets the option '{}' itself", option));
   std::vector<IntegratorChoice> choices;
   for (const Term& preconditioner : preconditioners())
     for (const Term& drift : drifts())
@@ -87,7 +105,8 @@ std::vector<IntegratorChoice> terms_of_the_step() {
         IntegratorChoice choice{
             .name = fmt::format("{}-{}-{}", preconditioner.name, drift.name, time_step.name),
             .integrator = Integrator::Langevin,
-            .settings = {{"mode", "chain"}}};
+            .settings = shared};
+        choice.settings.emplace_back("mode", "chain");
         for (const Term* term : {&preconditioner, &drift, &time_step})
           choice.settings.insert(choice.settings.end(), term->settings.begin(),
                                  term->settings.end());
