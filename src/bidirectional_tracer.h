@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Bidirectional path tracing (Lafortune and Willems 1993; Veach 1997, ch. 10): for each sample a
-/// subpath from the sensor, one from the light, and all connections between them and to freshly
-/// drawn emitter points.
+/// subpath from the sensor, one from the light, or at a lower rate of the guide only for some, and
+/// all connections between them and to freshly drawn emitter points.
 #pragma once
 
 #include <cmath>
@@ -57,9 +57,16 @@ class BidirectionalTracer {
   }
   template <class Sink>
   void sample(const Vec2d& film, const SampleNumbers& numbers, Sink& sink) {
+    sample(film, numbers, guide_.draws(numbers.light), sink);
+  }
+  /// With a light subpath or without, as its caller has drawn. The values are those at the guide's
+  /// rate: what is found by way of the subpath is divided by it.
+  template <class Sink>
+  void sample(const Vec2d& film, const SampleNumbers& numbers, bool with_light, Sink& sink) {
     draw_lens(numbers.sensor);
     const auto escape = trace_from_sensor(film, max_depth_, numbers.sensor);
-    if (scene_.samples_emitters()) trace_from_light(max_depth_ - 1, numbers.light);
+    from_light_.clear();
+    if (with_light && scene_.samples_emitters()) trace_from_light(max_depth_ - 1, numbers.light);
     for (int t = 2; t < from_sensor_.size() + 2; ++t) {
       const SubpathVertex& z = from_sensor_[t - 2];
       hit_area(z, t, sink);
@@ -99,7 +106,10 @@ class BidirectionalTracer {
     if (scene_.samples_emitters()) connect_to_light(z, t, numbers.connection, sink);
   }
 
-  /// The first ray of the light subpath of the last sample.
+  /// Of the last sample.
+  const Subpath& from_sensor() const { return from_sensor_; }
+  const Subpath& from_light() const { return from_light_; }
+  /// The first ray of its light subpath.
   const Emission& emission() const { return emission_; }
 
  private:

@@ -47,6 +47,12 @@ EmissionGuide::EmissionGuide(const Scene& scene, const std::vector<Record>& reco
   choice_.emplace(shares);
 }
 
+EmissionGuide EmissionGuide::at_rate(double rate) const {
+  EmissionGuide result = *this;
+  result.rate_ = rate;
+  return result;
+}
+
 Emission EmissionGuide::sample(Rng& rng) const {
   double u = rng.uniform();
   const Vec2d first = rng.uniform2();
@@ -58,10 +64,10 @@ Emission EmissionGuide::sample(Rng& rng) const {
 }
 
 double EmissionGuide::factor(std::uint32_t emitter, const Vec3d& p, const Vec3d& v) const {
-  if (!choice_) return 1.0;
+  if (!choice_) return rate_;
   const Learned& learned = emitters_[emitter];
-  if (learned.tree.is_uniform()) return learned.choice;
-  return learned.choice * learned.tree.density(emission_sample(*scene_, emitter, p, v));
+  if (learned.tree.is_uniform()) return rate_ * learned.choice;
+  return rate_ * learned.choice * learned.tree.density(emission_sample(*scene_, emitter, p, v));
 }
 
 }  // namespace driftlight

@@ -171,6 +171,9 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
              "redistribution: most mutations for each sample, in the mean"),
       choice("guide", redistribution.guide, std::array<std::string_view, 2>{"off", "on"},
              "redistribution: light subpaths start where a pilot has found that light comes from"),
+      number_or_auto("light_subpaths", redistribution.light_subpaths, Range<double>{0, 1, true},
+                     "redistribution: light subpaths for each sample, in the mean; auto: from a "
+                     "pilot"),
       number("pilot", redistribution.pilot, Range<int>{256, 1000000000},
              "redistribution: samples of the pilot's last round"),
       choice("split", splitting.all, std::array<std::string_view, 2>{"auto", "all"},

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "bidirectional_tracer.h"
+#include "light_rate.h"
 
 namespace driftlight {
 namespace {
@@ -83,6 +84,7 @@ Pilot run_pilot(const Scene& scene, const LangevinOptions& options, std::uint64_
     pilot.brightness = BrightnessMap(all.film, static_cast<double>(tasks * kTask));
     if (options.redistribution.guide) pilot.guide = EmissionGuide(scene, all.emissions);
   }
+  choose_light_rate(scene, options, seed, pilot);
   return pilot;
 }
 

@@ -220,6 +220,7 @@ LangevinResult render_redistribution(const Scene& scene, const LangevinOptions& 
     throw InputError("no path from the sensor to an emitter carries light");
   result.statistics.remainder = mean_luminance(chains);
   result.statistics.threshold = common.remainder.tau();
+  result.statistics.light_subpaths = common.pilot.guide.rate();
   result.statistics.samples_per_pixel = samples.samples_per_pixel;
   result.statistics.stopped = samples.stopped;
   result.statistics.bootstrap_seconds = pilot_seconds;

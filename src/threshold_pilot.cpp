@@ -131,7 +131,7 @@ class Sampler {
 };
 
 /// Error times time by the pilot, up to a factor.
-double cost_of(const std::vector<Sample>& samples, double tau,
+double cost_of(const std::vector<Sample>& samples, double tau, double sample_cost,
                const RedistributionOptions& options) {
   const auto count = static_cast<double>(samples.size());
   double left = 0.0;
@@ -165,7 +165,7 @@ double cost_of(const std::vector<Sample>& samples, double tau,
   }
   noise += squares - sum * sum / count;
   const double mutations = left / (count * deposit);
-  return noise * (1.0 + kMutationCost * mutations);
+  return noise * (sample_cost + kMutationCost * mutations);
 }
 
 }  // namespace
@@ -198,8 +198,8 @@ double choose_threshold(const Scene& scene, const LangevinOptions& options, cons
   const std::vector<Sample> samples =
       run(first_count, count, left / static_cast<double>(first_count) / kStarts);
   return *std::min_element(kThresholds.begin(), kThresholds.end(), [&](double a, double b) {
-    return cost_of(samples, a, options.redistribution) <
-           cost_of(samples, b, options.redistribution);
+    return cost_of(samples, a, pilot.sample_cost, options.redistribution) <
+           cost_of(samples, b, pilot.sample_cost, options.redistribution);
   });
 }
 

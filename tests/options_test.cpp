@@ -72,6 +72,8 @@ TEST(Options, SetReachesTheFields) {
   set_option(list, "scale_decades", "2");
   EXPECT_EQ(find(list, "large_step_probability").get(), "auto");
   set_option(list, "large_step_probability", "0");
+  EXPECT_EQ(find(list, "light_subpaths").get(), "auto");
+  set_option(list, "light_subpaths", "0.25");
   set_option(list, "chains", "7");
   set_option(list, "bootstrap", "1000");
   set_option(list, "max_depth", "16");
@@ -81,6 +83,7 @@ TEST(Options, SetReachesTheFields) {
   EXPECT_EQ(options.kernel.scale, 0.5);
   EXPECT_EQ(options.kernel.scale_decades, 2.0);
   EXPECT_EQ(options.large_step_probability, 0.0);
+  EXPECT_EQ(options.redistribution.light_subpaths, 0.25);
   EXPECT_EQ(options.chains, 7);
   EXPECT_EQ(options.bootstrap, 1000);
   EXPECT_EQ(options.max_depth, kMaxPathLength);
@@ -119,9 +122,10 @@ INSTANTIATE_TEST_SUITE_P(
         BadValue{"epsilon", "1e999"}, BadValue{"safety", "0"}, BadValue{"time_step_cap", "0"},
         BadValue{"scale", "-0.5"}, BadValue{"scale_decades", "-1"}, BadValue{"scale_decades", "11"},
         BadValue{"large_step_probability", "1.01"}, BadValue{"large_step_probability", "-0.01"},
-        BadValue{"chains", "0"}, BadValue{"chains", "1.5"}, BadValue{"chains", "1e3"},
-        BadValue{"bootstrap", "0"}, BadValue{"bootstrap", "99999999999999"},
-        BadValue{"max_depth", "0"}, BadValue{"max_depth", "17"}, BadValue{"max_depth", "0x4"}));
+        BadValue{"light_subpaths", "0"}, BadValue{"light_subpaths", "1.5"}, BadValue{"chains", "0"},
+        BadValue{"chains", "1.5"}, BadValue{"chains", "1e3"}, BadValue{"bootstrap", "0"},
+        BadValue{"bootstrap", "99999999999999"}, BadValue{"max_depth", "0"},
+        BadValue{"max_depth", "17"}, BadValue{"max_depth", "0x4"}));
 
 TEST(Options, AnUnknownNameIsRefusedWithTheValidOnes) {
   LangevinOptions options;

@@ -50,8 +50,8 @@ TEST(FoundPath, ItsValueIsContributionOverDensity) {
   const BrightnessMap flat({}, 1.0);
   for (const TestScene& test : test_scenes()) {
     SCOPED_TRACE(test.name);
-    // Guided, so that no density is as it was.
-    const EmissionGuide guide = learned_guide(test);
+    // Guided and at a low rate, so that no density is as it was.
+    const EmissionGuide guide = learned_guide(test).at_rate(0.5);
     const Remainder remainder(test.scene, guide, flat, 1.0);
     BidirectionalTracer tracer(test.scene, guide, MisHeuristic::Balance, test.max_depth);
     ComparingSink sink{test.scene, remainder, {}};
@@ -156,10 +156,31 @@ TEST(Redistribution, ChosenThresholdDoesNotDependOnThreads) {
   const LangevinResult two = render_small(scene, 2, std::nullopt);
   EXPECT_GE(one.statistics.threshold, 1.0);
   EXPECT_EQ(one.statistics.threshold, two.statistics.threshold);
+  EXPECT_EQ(one.statistics.light_subpaths, two.statistics.light_subpaths);
   EXPECT_EQ(one.image.rgb, two.image.rgb);
 }
 
 // Law: where chains do not move there is nothing to gain by them.
+/// Under an even sky light subpaths find nothing that the sensor's do not find as well. With light
+/// that only they find, each sample is to have one.
+TEST(Redistribution, ChoosesHowManyLightSubpathsPay) {
+  SceneBuilder builder;
+  const auto white =
+      builder.add_material({builder.add_bsdf(Diffuse{Texture(Rgbd{0.7, 0.6, 0.5})}), std::nullopt});
+  builder.add_shape(quad({-2, 0, 2}, {4, 0, 0}, {0, 0, -4}), white);
+  builder.add_shape(round_mesh({0, 0.5, 0}, 0.5, 8), white);
+  builder.set_environment(
+      EnvironmentMap(sun_bitmap(32, 16, 1.0F), Eigen::Matrix3d::Identity(), 1.0));
+  Camera camera = look_at({0.3, 1.6, 3.0}, {0, 0.4, 0}, 0.5);
+  camera.half_height = 0.375;
+  camera.film_width = 32;
+  camera.film_height = 24;
+  builder.set_camera(camera);
+  const double under_sky = render_small(builder.build(), 2, 1.0).statistics.light_subpaths;
+  EXPECT_LE(under_sky, 0.125);
+  EXPECT_EQ(render_small(load_small("point_caustic").scene, 2, 1.0).statistics.light_subpaths, 1.0);
+}
+
 TEST(Redistribution, ChoosesAHighThresholdForChainsThatStay) {
   const LoadedScene loaded = load_small("small_hole");
   const LangevinResult moving = render_small(loaded.scene, 2, std::nullopt);

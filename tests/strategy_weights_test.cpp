@@ -282,12 +282,13 @@ void count(const GivenPath& path, Coverage& seen) {
 }
 
 /// Calls visit(scene, guide, path) for random paths of all test scenes, guided as a pilot of each
-/// has learned.
+/// has learned; for every other one with few light subpaths.
 template <class Visit>
 Coverage for_random_paths(const Visit& visit) {
   Coverage seen;
   for (const TestScene& test : test_scenes()) {
     const EmissionGuide guide = learned_guide(test);
+    const EmissionGuide rare = guide.at_rate(0.1);
     for (std::uint64_t i = 0; i < 5000; ++i) {
       Rng rng(211, Stream::Test, i);
       const auto path = draw_path(test, rng);
@@ -302,7 +303,7 @@ Coverage for_random_paths(const Visit& visit) {
         }
       if (!smooth) continue;
       count(*path, seen);
-      visit(test.scene, guide, *path);
+      visit(test.scene, i % 2 == 0 ? guide : rare, *path);
     }
   }
   return seen;

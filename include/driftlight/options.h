@@ -90,6 +90,8 @@ struct RedistributionOptions {
   bool guide = true;
   /// Samples of the last round of the pilot, of about twice as many in all.
   int pilot = 65536;
+  /// Light subpaths for each sample, in the mean. None: as many as a pilot finds worth their time.
+  std::optional<double> light_subpaths = std::nullopt;
 };
 
 /// Of Mode::Splitting, whose samples and chains are those of Mode::Redistribution.

@@ -21,7 +21,8 @@ enum class Stream : std::uint64_t {
   Test,
   GradientCheck,
   SplittingPilot,
-  ThresholdPilot
+  ThresholdPilot,
+  LightRate
 };
 
 /// Uniform numbers in (0, 1) from elsewhere than a generator.

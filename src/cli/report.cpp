@@ -113,8 +113,10 @@ void report_redistribution(const std::string& integrator, const LangevinStatisti
   report.statistics.update({{"samples_per_pixel", s.samples_per_pixel},
                             {"starts", s.starts},
                             {"remainder", s.remainder},
-                            {"threshold", s.threshold}});
-  report.details.push_back(fmt::format("threshold {:g}", s.threshold));
+                            {"threshold", s.threshold},
+                            {"light_subpaths", s.light_subpaths}});
+  report.details.push_back(fmt::format("threshold {:g}, {:g} light subpaths for each sample",
+                                       s.threshold, s.light_subpaths));
   report.summary = {
       fmt::format("{}: {} x {} pixels, {:.4g} samples and {:.4g} mutations per pixel in {:.2f} s",
                   integrator, image.width, image.height, s.samples_per_pixel,

@@ -11,6 +11,7 @@ inline EmissionGuide learned_guide(const TestScene& test) {
   LangevinOptions options;
   options.max_depth = test.max_depth;
   options.redistribution.pilot = 8192;
+  options.redistribution.light_subpaths = 1;
   return run_pilot(test.scene, options, 1).guide;
 }
 

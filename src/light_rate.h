@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "pilot.h"
+
+namespace driftlight {
+
+/// Sets the rate of the pilot's guide, and what a sample then costs, as the options say or so that
+/// noise times cost is least (the choice of sample numbers of Grittmann et al. 2022,
+/// "Efficiency-aware multiple importance sampling for bidirectional rendering algorithms", for one
+/// number and the whole image).
+///
+/// At the rate c a sample brings A + B with probability c and else A to its own pixel, A from the
+/// sensor and B by way of its light subpath, and b_i to others, all of them by weights for c; so
+///   E[X^2] = E[A^2] + c E[2 A B + B^2 + sum b_i^2].
+/// The product of A + c B of two samples at one film point is E[X]^2 there in the mean, which is no
+/// noise. Weights change no random decision. So the same samples, each with a light subpath, tell
+/// the noise for all rates, whose differences are then hardly random. A path that is brighter than
+/// chains leave to samples counts as w^2 up to there and linearly beyond, as the noise of short
+/// chains does. Costs are counted in rays and connections, so that they are the same in every run.
+/// A function of its arguments, whatever the threads.
+void choose_light_rate(const Scene& scene, const LangevinOptions& options, std::uint64_t seed,
+                       Pilot& pilot);
+
+}  // namespace driftlight
