@@ -16,7 +16,7 @@ namespace {
 constexpr std::uint64_t kTask = 256;
 /// Samples of the pilot's last round for each pair of these.
 constexpr std::uint64_t kFewer = 16;
-constexpr std::array<double, 5> kRates{1.0, 1.0 / 2, 1.0 / 4, 1.0 / 8, 1.0 / 16};
+constexpr std::array<double, 3> kRates{1.0, 1.0 / 4, 1.0 / 16};
 /// A lower rate must promise to be better by this factor: what it makes rarer the pilot may have
 /// missed, and chains may take more of the time than samples.
 constexpr double kWorth = 1.5;
