@@ -433,6 +433,26 @@ TEST_F(CompareCli, ASignalKeepsCompleteRoundsOrNothing) {
   EXPECT_LT(results().at("runs").get<int>(), 100);
 }
 
+TEST_F(CompareCli, ASignalInTheSecondHalfOfAStudyKeepsTheFirst) {
+  test::Process study(
+      {test::program(), "compare", "scene.xml", "--out", "out", "--study", "terms:bootstrap=1000",
+       "--time", "0.02", "--mutations-per-pixel", "1e6", "--runs", "2"},
+      folder(), scratch(), test::Process::Stderr::Terminal);
+  const auto first_half_is_there = [&] {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder()))
+      if (entry.path().filename() == "report.html") return true;
+    return false;
+  };
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (!first_half_is_there() && std::chrono::steady_clock::now() < end)
+    study.wait_for("nothing", std::chrono::milliseconds(50));  // but reads the terminal
+  ASSERT_TRUE(first_half_is_there());
+  study.send(SIGINT);
+  EXPECT_EQ(study.exit_code(), 0);
+  EXPECT_TRUE(contains(study.standard_error(), "no equal_mutations")) << study.standard_error();
+  EXPECT_EQ(files("out"), std::set<std::string>{"equal_time"});
+}
+
 // --- The page ------------------------------------------------------------------------------------
 
 /// A browser that runs without a window, if there is one.

@@ -77,7 +77,7 @@ const std::map<std::string, Way>& ways() {
       {"short_chains",
        {.mode = Mode::Redistribution, .drift = Drift::None, .redistribution = {0.2, 7, 6}}},
       {"rare_light_subpaths",
-       {.mode = Mode::Redistribution,
+       {.mode = Mode::Splitting,
         .phase_space = PhaseSpace::Bidirectional,
         .redistribution = {.light_subpaths = 0.1}}},
       {"redistribution_both_ends",

@@ -143,7 +143,7 @@ Compared compare(const LoadedScene& loaded, const CompareCommand& command, const
   return {std::move(contenders), std::move(expected), std::move(results)};
 }
 
-/// What the terminal shows; the table of a study also goes into its folder.
+/// What the terminal shows; the table of a whole study also goes into its folder.
 std::string summarize(const std::vector<nlohmann::ordered_json>& results,
                       const std::filesystem::path& folder) {
   if (results.size() == 1) return summary_text(results.front());
@@ -167,12 +167,19 @@ void run(const CompareCommand& command) {
   std::vector<nlohmann::ordered_json> results;
   std::string written;
   for (const Budget& budget : command.budgets) {
-    Compared compared = compare(loaded, command, budget.work, reference);
+    std::optional<Compared> compared;
+    try {
+      compared = compare(loaded, command, budget.work, reference);
+    } catch (const StoppedTooEarly&) {
+      if (results.empty()) throw;
+      print_notice(fmt::format("stopped early: there is no {}", budget.folder));
+      break;
+    }
     if (!pending) pending.emplace(command.folder);
     const std::filesystem::path folder = pending->temporary() / budget.folder;
     std::filesystem::create_directories(folder);
-    write_all(folder, compared.contenders, reference, compared.expected, compared.results);
-    results.push_back(std::move(compared.results));
+    write_all(folder, compared->contenders, reference, compared->expected, compared->results);
+    results.push_back(std::move(compared->results));
     written += fmt::format("wrote {}\n", (command.folder / budget.folder / "report.html").string());
   }
   const std::string summary = summarize(results, pending->temporary());

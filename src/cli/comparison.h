@@ -13,6 +13,7 @@
 
 #include "cli/arguments.h"
 #include "cli/integrator.h"
+#include "driftlight/error.h"
 #include "driftlight/render.h"
 
 namespace driftlight::cli {
@@ -50,8 +51,14 @@ std::vector<Contender> contenders_of(const std::vector<IntegratorChoice>& choice
 /// Fractions of the budget, rising: 1, 1/2, 1/4, .. to about a second, to 1/8 at least.
 std::vector<double> moments_of(const Work& work);
 
+/// There are not two complete rounds of runs.
+class StoppedTooEarly : public RuntimeError {
+ public:
+  using RuntimeError::RuntimeError;
+};
+
 /// Renders all runs of the command. If `stop` turns true, the runs of the round under way are
-/// dropped; throws RuntimeError if fewer than two rounds are complete.
+/// dropped; throws StoppedTooEarly if fewer than two rounds are complete.
 void render_runs(const Scene& scene, const CompareCommand& command, const Work& work,
                  const std::atomic<bool>& stop,
                  const std::function<void(const Progress&)>& progress,
