@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "bidirectional_tracer.h"
@@ -40,16 +41,12 @@ struct Sums {
   }
 };
 
+/// Of samples with a light subpath each.
 struct Work {
   double sensor = 0;
   double light = 0;
 
   double at(double rate) const { return sensor + rate * light; }
-  Work& operator+=(const Work& other) {
-    sensor += other.sensor;
-    light += other.light;
-    return *this;
-  }
 };
 
 /// What pairs of samples tell of all rates.
@@ -59,11 +56,10 @@ struct Judged {
 
   Judged& operator+=(const Judged& other) {
     for (std::size_t k = 0; k < noise.size(); ++k) noise[k] += other.noise[k];
-    work += other.work;
+    work.sensor += other.work.sensor;
+    work.light += other.work.light;
     return *this;
   }
-  /// Noise times cost at rate k, up to a factor.
-  double inefficiency(std::size_t k) const { return noise[k] * work.at(kRates[k]); }
 };
 
 /// Adds up what a sample finds.
@@ -91,15 +87,16 @@ class Sink {
   Sums sums_;
 };
 
-/// Of the tracer's last sample, with a light subpath.
-Work work_of(const BidirectionalTracer& tracer, int max_depth) {
+/// Adds the tracer's last sample.
+void add_work(const BidirectionalTracer& tracer, int max_depth, Work& work) {
   const int z = tracer.from_sensor().size();
   const int y = tracer.from_light().size();
   int connections = y;  // to the sensor
   for (int j = 0; j < y; ++j)
     for (int i = 0; i < z && i + j + 3 <= max_depth; ++i)
       if (tracer.from_sensor()[i].connects && tracer.from_light()[j].connects) ++connections;
-  return {1.0 + (1.0 + kConnectionCost) * z, 1.0 + y + kConnectionCost * connections};
+  work.sensor += 1.0 + (1.0 + kConnectionCost) * z;
+  work.light += 1.0 + y + kConnectionCost * connections;
 }
 
 /// Pairs first .. first + kTask - 1.
@@ -117,7 +114,7 @@ Judged run_task(const Scene& scene, const Pilot& pilot, int max_depth, std::uint
         Sink sink(film, pilot.brightness);
         tracer.sample(film, SampleNumbers{rng, rng, rng}, true, sink);
         sums = sink.sums();
-        if (k == 0) judged.work += work_of(tracer, max_depth);
+        if (k == 0) add_work(tracer, max_depth, judged.work);
       }
       const auto& [a, b] = pair;
       judged.noise[k] +=
@@ -127,8 +124,10 @@ Judged run_task(const Scene& scene, const Pilot& pilot, int max_depth, std::uint
   return judged;
 }
 
-Judged judge(const Scene& scene, const LangevinOptions& options, std::uint64_t seed,
-             const Pilot& pilot) {
+}  // namespace
+
+std::vector<LightRate> judge_light_rates(const Scene& scene, const LangevinOptions& options,
+                                         std::uint64_t seed, const Pilot& pilot) {
   const auto pairs = static_cast<std::uint64_t>(options.redistribution.pilot) / kFewer;
   std::vector<Judged> parts(std::max<std::uint64_t>(1, pairs / kTask));
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
@@ -136,25 +135,33 @@ Judged judge(const Scene& scene, const LangevinOptions& options, std::uint64_t s
   });
   Judged sum;
   for (const Judged& part : parts) sum += part;
-  return sum;
+  std::vector<LightRate> rates;
+  for (std::size_t k = 0; k < kRates.size(); ++k)
+    rates.push_back({kRates[k], sum.noise[k] / static_cast<double>(parts.size() * kTask),
+                     sum.work.at(kRates[k]) / sum.work.at(1.0)});
+  return rates;
 }
-
-}  // namespace
 
 void choose_light_rate(const Scene& scene, const LangevinOptions& options, std::uint64_t seed,
                        Pilot& pilot) {
-  if (options.redistribution.light_subpaths == 1.0) return;
-  const Judged judged = judge(scene, options, seed, pilot);
-  double rate = 1.0;
-  double least = judged.inefficiency(0) / kWorth;
-  for (std::size_t k = 1; k < kRates.size(); ++k)
-    if (judged.inefficiency(k) < least) {
-      least = judged.inefficiency(k);
-      rate = kRates[k];
+  const std::optional<double> wanted = options.redistribution.light_subpaths;
+  if (wanted == 1.0) return;
+  const std::vector<LightRate> rates = judge_light_rates(scene, options, seed, pilot);
+  LightRate best = rates.front();
+  double least = best.noise * best.cost / kWorth;
+  for (const LightRate& at : rates)
+    if (at.noise * at.cost < least) {
+      best = at;
+      least = at.noise * at.cost;
     }
-  rate = options.redistribution.light_subpaths.value_or(rate);
-  pilot.guide = pilot.guide.at_rate(rate);
-  pilot.sample_cost = judged.work.at(rate) / judged.work.at(1.0);
+  if (wanted) {
+    // Costs are linear in the rate.
+    const LightRate& low = rates.back();
+    const double of_light = (1.0 - low.cost) / (1.0 - low.rate);
+    best = {*wanted, 0.0, 1.0 - (1.0 - *wanted) * of_light};
+  }
+  pilot.guide = pilot.guide.at_rate(best.rate);
+  pilot.sample_cost = best.cost;
 }
 
 }  // namespace driftlight

@@ -2,16 +2,19 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "pilot.h"
 
 namespace driftlight {
 
-/// Sets the rate of the pilot's guide, and what a sample then costs, as the options say or so that
-/// noise times cost is least (the choice of sample numbers of Grittmann et al. 2022,
-/// "Efficiency-aware multiple importance sampling for bidirectional rendering algorithms", for one
-/// number and the whole image).
-///
+/// What so many light subpaths a sample promise.
+struct LightRate {
+  double rate;
+  double noise;  ///< variance of a sample, in units of the brightness around
+  double cost;   ///< of a sample, over one with a light subpath
+};
+
 /// At the rate c a sample brings A + B with probability c and else A to its own pixel, A from the
 /// sensor and B by way of its light subpath, and b_i to others, all of them by weights for c; so
 ///   E[X^2] = E[A^2] + c E[2 A B + B^2 + sum b_i^2].
@@ -21,6 +24,13 @@ namespace driftlight {
 /// chains leave to samples counts as w^2 up to there and linearly beyond, as the noise of short
 /// chains does. Costs are counted in rays and connections, so that they are the same in every run.
 /// A function of its arguments, whatever the threads.
+std::vector<LightRate> judge_light_rates(const Scene& scene, const LangevinOptions& options,
+                                         std::uint64_t seed, const Pilot& pilot);
+
+/// Sets the rate of the pilot's guide, and what a sample then costs, as the options say or so that
+/// noise times cost is least (the choice of sample numbers of Grittmann et al. 2022,
+/// "Efficiency-aware multiple importance sampling for bidirectional rendering algorithms", for one
+/// number and the whole image).
 void choose_light_rate(const Scene& scene, const LangevinOptions& options, std::uint64_t seed,
                        Pilot& pilot);
 

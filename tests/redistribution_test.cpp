@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "brightness_map.h"
 #include "driftlight/render.h"
 #include "found_path.h"
+#include "light_rate.h"
 #include "remainder.h"
 #include "support/learned_guide.h"
 #include "support/test_scenes.h"
@@ -161,6 +163,50 @@ TEST(Redistribution, ChosenThresholdDoesNotDependOnThreads) {
 }
 
 // Law: where chains do not move there is nothing to gain by them.
+/// The noise of samples that draw whether they have a light subpath.
+class DrawnNoise {
+ public:
+  void add(const Rgbd& value, const FoundPath&) { own_ += luminance(value); }
+  void splat(const Vec2d&, const Rgbd& value, const FoundPath&) {
+    splats2_ += sqr(luminance(value));
+  }
+
+  /// Of two samples at one film point.
+  template <class Draw>
+  double of_pair(const Draw& draw) {
+    own_ = splats2_ = 0;
+    draw(*this);
+    const double first = std::exchange(own_, 0.0);
+    draw(*this);
+    return 0.5 * (sqr(first - own_) + splats2_);
+  }
+
+ private:
+  double own_ = 0;
+  double splats2_ = 0;
+};
+
+/// What samples that all have a light subpath tell of lower rates, against samples at these rates.
+TEST(LightRate, NoiseIsThatOfSamplesAtTheRate) {
+  const Scene scene = limelight();
+  LangevinOptions options;
+  options.max_depth = 5;
+  options.redistribution.pilot = 1 << 20;
+  const Pilot pilot{BrightnessMap({}, 1.0), EmissionGuide(scene)};
+  for (const LightRate& at : judge_light_rates(scene, options, 3, pilot)) {
+    const EmissionGuide guide = pilot.guide.at_rate(at.rate);
+    BidirectionalTracer tracer(scene, guide, MisHeuristic::Balance, options.max_depth);
+    DrawnNoise noise;
+    RunningMean mean;
+    for (std::uint64_t i = 0; i < 65536; ++i) {
+      Rng rng(7, Stream::Test, i);
+      const Vec2d film = rng.uniform2();
+      mean.add(noise.of_pair([&](DrawnNoise& sink) { tracer.sample(film, rng, sink); }));
+    }
+    EXPECT_NEAR(at.noise / mean.mean(), 1.0, 0.05) << at.rate << " " << mean.error() / mean.mean();
+  }
+}
+
 /// Under an even sky light subpaths find nothing that the sensor's do not find as well. With light
 /// that only they find, each sample is to have one.
 TEST(Redistribution, ChoosesHowManyLightSubpathsPay) {
