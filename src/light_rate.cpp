@@ -26,8 +26,8 @@ constexpr double kBright = 8;
 /// What a connection costs in rays of a subpath.
 constexpr double kConnectionCost = 0.5;
 
-/// Whose square is the noise of a path of weight w.
-double noise_of(double w) { return std::sqrt(w < kBright ? w * w : kBright * (2.0 * w - kBright)); }
+/// w, or what has the square of its cut noise.
+double cut(double w) { return std::sqrt(w < kBright ? w * w : kBright * (2.0 * w - kBright)); }
 
 /// What a sample with a light subpath finds, by weights for one rate.
 struct Sums {
@@ -41,6 +41,11 @@ struct Sums {
   }
 };
 
+/// Of two samples at one film point.
+double noise_of(const Sums& a, const Sums& b, double rate) {
+  return 0.5 * (a.square(rate) + b.square(rate)) - a.mean(rate) * b.mean(rate);
+}
+
 /// Of samples with a light subpath each.
 struct Work {
   double sensor = 0;
@@ -52,10 +57,14 @@ struct Work {
 /// What pairs of samples tell of all rates.
 struct Judged {
   std::array<double, kRates.size()> noise{};
+  std::array<double, kRates.size()> cut{};
   Work work;
 
   Judged& operator+=(const Judged& other) {
-    for (std::size_t k = 0; k < noise.size(); ++k) noise[k] += other.noise[k];
+    for (std::size_t k = 0; k < kRates.size(); ++k) {
+      noise[k] += other.noise[k];
+      cut[k] += other.cut[k];
+    }
     work.sensor += other.work.sensor;
     work.light += other.work.light;
     return *this;
@@ -68,23 +77,32 @@ class Sink {
   Sink(const Vec2d& film, const BrightnessMap& brightness) : film_(film), brightness_(brightness) {}
 
   void add(const Rgbd& value, const FoundPath& path) {
-    (path.s > 1 ? sums_.light : sums_.sensor) += noise_at(film_, value);
+    const double w = weight(film_, value);
+    if (path.s > 1) {
+      whole.light += w;
+      bounded.light += cut(w);
+    } else {
+      whole.sensor += w;
+      bounded.sensor += cut(w);
+    }
   }
   void splat(const Vec2d& film, const Rgbd& value, const FoundPath&) {
-    sums_.splats2 += sqr(noise_at(film, value));
+    const double w = weight(film, value);
+    whole.splats2 += sqr(w);
+    bounded.splats2 += sqr(cut(w));
   }
 
-  const Sums& sums() const { return sums_; }
+  Sums whole;
+  Sums bounded;  ///< with bright paths cut
 
  private:
-  double noise_at(const Vec2d& film, const Rgbd& value) const {
+  double weight(const Vec2d& film, const Rgbd& value) const {
     const double y = luminance(value);
-    return std::isfinite(y) ? noise_of(y / brightness_(film)) : 0.0;
+    return std::isfinite(y) ? y / brightness_(film) : 0.0;
   }
 
   Vec2d film_;
   const BrightnessMap& brightness_;
-  Sums sums_;
 };
 
 /// Adds the tracer's last sample.
@@ -109,16 +127,13 @@ Judged run_task(const Scene& scene, const Pilot& pilot, int max_depth, std::uint
     for (std::uint64_t i = first; i < first + kTask; ++i) {
       Rng rng(seed, Stream::LightRate, i);
       const Vec2d film = rng.uniform2();
-      std::array<Sums, 2> pair;
-      for (Sums& sums : pair) {
-        Sink sink(film, pilot.brightness);
+      std::array<Sink, 2> pair{Sink(film, pilot.brightness), Sink(film, pilot.brightness)};
+      for (Sink& sink : pair) {
         tracer.sample(film, SampleNumbers{rng, rng, rng}, true, sink);
-        sums = sink.sums();
         if (k == 0) add_work(tracer, max_depth, judged.work);
       }
-      const auto& [a, b] = pair;
-      judged.noise[k] +=
-          0.5 * (a.square(kRates[k]) + b.square(kRates[k])) - a.mean(kRates[k]) * b.mean(kRates[k]);
+      judged.noise[k] += noise_of(pair[0].whole, pair[1].whole, kRates[k]);
+      judged.cut[k] += noise_of(pair[0].bounded, pair[1].bounded, kRates[k]);
     }
   }
   return judged;
@@ -135,9 +150,10 @@ std::vector<LightRate> judge_light_rates(const Scene& scene, const LangevinOptio
   });
   Judged sum;
   for (const Judged& part : parts) sum += part;
+  const auto count = static_cast<double>(parts.size() * kTask);
   std::vector<LightRate> rates;
   for (std::size_t k = 0; k < kRates.size(); ++k)
-    rates.push_back({kRates[k], sum.noise[k] / static_cast<double>(parts.size() * kTask),
+    rates.push_back({kRates[k], sum.noise[k] / count, sum.cut[k] / count,
                      sum.work.at(kRates[k]) / sum.work.at(1.0)});
   return rates;
 }
@@ -147,18 +163,22 @@ void choose_light_rate(const Scene& scene, const LangevinOptions& options, std::
   const std::optional<double> wanted = options.redistribution.light_subpaths;
   if (wanted == 1.0) return;
   const std::vector<LightRate> rates = judge_light_rates(scene, options, seed, pilot);
-  LightRate best = rates.front();
-  double least = best.noise * best.cost / kWorth;
-  for (const LightRate& at : rates)
-    if (at.noise * at.cost < least) {
+  const LightRate& all = rates.front();
+  LightRate best = all;
+  double least = 1.0 / kWorth;
+  for (const LightRate& at : rates) {
+    const double inefficiency = at.cost * std::max(at.noise / all.noise, at.cut / all.cut);
+    if (inefficiency < least) {
       best = at;
-      least = at.noise * at.cost;
+      least = inefficiency;
     }
+  }
   if (wanted) {
     // Costs are linear in the rate.
     const LightRate& low = rates.back();
     const double of_light = (1.0 - low.cost) / (1.0 - low.rate);
-    best = {*wanted, 0.0, 1.0 - (1.0 - *wanted) * of_light};
+    best.rate = *wanted;
+    best.cost = 1.0 - (1.0 - *wanted) * of_light;
   }
   pilot.guide = pilot.guide.at_rate(best.rate);
   pilot.sample_cost = best.cost;
