@@ -156,7 +156,8 @@ void render_runs(const Scene& scene, const CompareCommand& command, const Work& 
   std::size_t complete = 0;
   while (complete < rounds && round_is_complete()) ++complete;
   if (complete < 2)
-    throw StoppedTooEarly("stopped before there were two runs of each integrator; nothing is written");
+    throw StoppedTooEarly(
+        "stopped before there were two runs of each integrator; nothing is written");
   for (Contender& contender : contenders) contender.runs.resize(complete);
 }
 

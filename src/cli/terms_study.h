@@ -12,8 +12,8 @@ namespace driftlight::cli {
 
 /// Long-lived chains with every preconditioner, drift and time-step rule, alike in all else. The
 /// steps without a matrix have the size that was best for them on `glossy_chain`. The rules are the
-/// default, and a careful one that divides dt by 10 and bounds it by 0.01 ([E63], section 6). All of
-/// them have the settings `shared`. Throws UsageError if one of these is what the study varies.
+/// default, and a careful one that divides dt by 10 and bounds it by 0.01 ([E63], section 6). All
+/// of them have the settings `shared`. Throws UsageError if one of these is what the study varies.
 std::vector<IntegratorChoice> terms_of_the_step(const Settings& shared);
 
 /// One line for each of these: what it reaches at equal time, with its mutations, and at equal
