@@ -19,8 +19,8 @@ constexpr std::uint64_t kTask = 256;
 constexpr std::uint64_t kFewer = 16;
 constexpr std::array<double, 3> kRates{1.0, 1.0 / 4, 1.0 / 16};
 /// A lower rate must promise to be better by this factor: what it makes rarer the pilot may have
-/// missed.
-constexpr double kWorth = 1.1;
+/// missed, and chains may take more of the time than samples.
+constexpr double kWorth = 1.5;
 /// Where chains take over.
 constexpr double kBright = 8;
 /// What a connection costs in rays of a subpath.
