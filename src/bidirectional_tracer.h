@@ -73,7 +73,7 @@ class BidirectionalTracer {
   void sample(const Vec2d& film, const SampleNumbers& numbers, Sink& sink) {
     if (guide_.rate() == 1.0) return sample(film, numbers, true, sink);
     Rng own = scrambled(numbers.light);
-    sample(film, SampleNumbers{own, own, own}, guide_.draws(own), sink);
+    sample(film, SampleNumbers{own, own, own}, own.uniform() < guide_.rate(), sink);
   }
   /// With a light subpath or without, as its caller has drawn. The values are those at the guide's
   /// rate: what is found by way of the subpath is divided by it.

@@ -41,8 +41,6 @@ class EmissionGuide {
   EmissionGuide at_rate(double rate) const;
 
   double rate() const { return rate_; }
-  /// Whether a sample has a light subpath. Draws nothing if all have.
-  bool draws(Rng& rng) const { return rate_ == 1.0 || rng.uniform() < rate_; }
   /// The first ray of a light subpath.
   Emission sample(Rng& rng) const;
   /// Of the ray along v through p, as of emission_sample: its density over that of emission.
