@@ -34,19 +34,6 @@ struct SampleNumbers {
   Rng& connection;
 };
 
-/// A generator far from those of the samples nearby. Theirs differ in seed or stream alone, by
-/// which the n-th numbers of all of them lie on one lattice in the sample's index (the increment
-/// and the state of a linear generator): some numbers further on, what a threshold on one leaves of
-/// the others is neither even nor independent between seeds.
-inline Rng scrambled(Rng& rng) {
-  const auto high = static_cast<std::uint64_t>(rng.uniform() * 0x1p32);
-  std::uint64_t bits = (high << 32U) + static_cast<std::uint64_t>(rng.uniform() * 0x1p32);
-  // The finalizer of SplitMix64 (Steele, Lea and Flood 2014).
-  bits = (bits ^ (bits >> 30U)) * 0xbf58476d1ce4e5b9U;
-  bits = (bits ^ (bits >> 27U)) * 0x94d049bb133111ebU;
-  return {bits ^ (bits >> 31U), Stream::LightRate, 0};
-}
-
 /// Reports each path that it finds to the sink:
 ///   add(value, path)           for the film point that the sample was asked for,
 ///   splat(film, value, path)   for another one, s > 1 and t = 1.
@@ -71,9 +58,8 @@ class BidirectionalTracer {
   }
   template <class Sink>
   void sample(const Vec2d& film, const SampleNumbers& numbers, Sink& sink) {
-    if (guide_.rate() == 1.0) return sample(film, numbers, true, sink);
-    Rng own = scrambled(numbers.light);
-    sample(film, SampleNumbers{own, own, own}, own.uniform() < guide_.rate(), sink);
+    const bool with_light = guide_.rate() == 1.0 || numbers.light.uniform() < guide_.rate();
+    sample(film, numbers, with_light, sink);
   }
   /// With a light subpath or without, as its caller has drawn. The values are those at the guide's
   /// rate: what is found by way of the subpath is divided by it.

@@ -294,7 +294,7 @@ TEST_F(CompareCli, CountsTheFamiliesOfSplitting) {
 <bsdf type="conductor"/></shape>)");
   std::ofstream(folder() / "scene.xml") << lamp;
   const Outcome outcome =
-      compare({"--integrators", "langevin:pilot=1024:splitting_pilot=256:split=all", "--spp", "2",
+      compare({"--integrators", "langevin:pilot=1024:splitting_pilot=1024:split=all", "--spp", "2",
                "--runs", "2"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_GT(results().at("integrators")[0].at("effective_families").get<double>(), 1.0);

@@ -165,7 +165,7 @@ TEST(Constraints, JacobiansEqualRiddersDifferences) {
   using J = ceres::Jet<double, kWidth>;
   ClassCounter classes;
   for (const TestScene& test : test_scenes()) {
-    for (const Path& path : light_paths(test, 150, 13)) {
+    for (const Path& path : light_paths(test, 250, 13)) {
       classes.add(classes_of(test.scene, path));
       const Prepared p(test.scene, path);
       const int d = p.chart.dimension();

@@ -366,7 +366,7 @@ TEST(Stationarity, WrongReverseDensityFails) {
         1e-8)
         << name(drift);
     EXPECT_LT(
-        smallest_p_value(SphereTarget(), options_of(drift, 1.5, 1.0), Reverse::Wrong, 48, 600),
+        smallest_p_value(SphereTarget(), options_of(drift, 1.5, 1.0), Reverse::Wrong, 64, 900),
         1e-8)
         << name(drift);
   }

@@ -43,8 +43,8 @@ SceneCheck check_scene(const Scene& scene, const SceneCheckOptions& options,
                        const DerivativeFunctions& functions = DerivativeFunctions());
 
 /// Path `index` of `seed`: a function of the other arguments alone. None if no light is found.
-std::optional<PathSampler::Sample> draw_light_path(const Scene& scene, int max_depth,
-                                                   std::uint64_t seed, std::uint64_t index,
-                                                   PhaseSpace phase_space = {});
+std::optional<PathSampler::Sample> draw_light_path(
+    const Scene& scene, int max_depth, std::uint64_t seed, std::uint64_t index,
+    PhaseSpace phase_space = LangevinOptions{}.phase_space);
 
 }  // namespace driftlight
