@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Meshes of obj and serialized files.
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 #include <zlib.h>
 
+#include <array>
 #include <cmath>
 #include <cstring>
 
@@ -88,6 +90,37 @@ TEST(ObjFile, NegativeIndicesCountFromTheEnd) {
   const TriangleMesh mesh = load_mesh("obj", "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n");
   ASSERT_EQ(mesh.positions.size(), 3U);
   expect_near(mesh.positions[mesh.triangles[0][1]], Eigen::Vector3f(1, 0, 0));
+}
+
+TEST(ObjFile, MergesEqualVertices) {
+  // The second triangle has a corner of its own, three that equal the first's, and a copy of one
+  // with another texture coordinate.
+  const TriangleMesh mesh =
+      load_mesh("obj",
+                "v 0 0 0\nv 1 0 0\nv 0 1 0\nv -0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 1\n"
+                "f 1/1 2/1 3/1\nf 4/1 5/1 6/1\nf 4/2 2/1 6/1\n");
+  EXPECT_EQ(mesh.positions.size(), 5U);
+  const std::vector<std::array<std::uint32_t, 3>> expected{{0, 1, 2}, {0, 1, 3}, {4, 1, 3}};
+  EXPECT_EQ(mesh.triangles, expected);
+}
+
+// Files are parsed a megabyte at a time, here amid squares, whose indices count from the end.
+TEST(ObjFile, LargeFilesAreReadInOrder) {
+  constexpr int kSquares = 40000;
+  std::string file;
+  for (int i = 0; i < kSquares; ++i)
+    file += fmt::format("v {0} 0 0\nv {0}.5 0 0\nv {0}.5 1 0\nv {0} 1 0\nf -4 -3 -2 -1\n", i);
+  const std::vector<TriangleMesh> parts = load_meshes("obj", file + "g last\nf 1 2 3\n");
+  ASSERT_EQ(parts.size(), 2U);
+  ASSERT_EQ(parts[0].positions.size(), 4U * kSquares);
+  ASSERT_EQ(parts[0].triangles.size(), 2U * kSquares);
+  for (std::uint32_t i = 0; i < kSquares; ++i) {
+    const std::array<std::uint32_t, 3> first{4 * i, 4 * i + 1, 4 * i + 2};
+    ASSERT_EQ(parts[0].triangles[2 * i], first);
+    ASSERT_EQ(parts[0].positions[4 * i].x(), static_cast<float>(i));
+  }
+  ASSERT_EQ(parts[1].positions.size(), 3U);
+  EXPECT_EQ(parts[1].positions[1].x(), 0.5F);
 }
 
 TEST(ObjFile, FlipsTextureCoordinatesByDefault) {

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mesh.h"
 
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
 #include <Eigen/LU>
 #include <algorithm>
+#include <boost/container_hash/hash.hpp>
 #include <cmath>
+#include <cstdint>
 
 #include "driftlight/error.h"
 
@@ -41,18 +46,68 @@ bool all_finite(const std::vector<Vector>& vectors) {
   return std::all_of(vectors.begin(), vectors.end(), [](const Vector& v) { return v.allFinite(); });
 }
 
-void compute_smooth_normals(TriangleMesh& mesh) {
+/// In parallel by blocks of triangles, which are added up in their order.
+std::vector<Vec3d> normal_sums(const TriangleMesh& mesh) {
+  constexpr std::size_t kBlock = std::size_t{1} << 16U;
   std::vector<Vec3d> sums(mesh.positions.size(), Vec3d::Zero());
-  for (const auto& triangle : mesh.triangles) {
-    const std::array<Vec3d, 3> normals = weighted_normals(mesh, triangle);
-    for (std::size_t corner = 0; corner < 3; ++corner) sums[triangle[corner]] += normals[corner];
+  std::vector<std::array<Vec3d, 3>> normals(std::min(kBlock, mesh.triangles.size()));
+  for (std::size_t first = 0; first < mesh.triangles.size(); first += kBlock) {
+    const std::size_t count = std::min(kBlock, mesh.triangles.size() - first);
+    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+      normals[i] = weighted_normals(mesh, mesh.triangles[first + i]);
+    });
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t corner = 0; corner < 3; ++corner)
+        sums[mesh.triangles[first + i][corner]] += normals[i][corner];
   }
-  mesh.normals.clear();
-  for (const Vec3d& sum : sums) {
+  return sums;
+}
+
+void compute_smooth_normals(TriangleMesh& mesh) {
+  const std::vector<Vec3d> sums = normal_sums(mesh);
+  mesh.normals.resize(sums.size());
+  tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t i) {
     // Vertices of no triangle with an area need some direction, too.
-    const Vec3d normal = sum.norm() > 0.0 ? Vec3d(sum.normalized()) : Vec3d(1, 0, 0);
-    mesh.normals.emplace_back(normal.cast<float>());
+    const Vec3d normal = sums[i].norm() > 0.0 ? Vec3d(sums[i].normalized()) : Vec3d(1, 0, 0);
+    mesh.normals[i] = normal.cast<float>();
+  });
+}
+
+/// Of a vertex: position, normal and texture coordinates; the latter two zero where absent.
+std::array<float, 8> vertex_key(const TriangleMesh& mesh, std::uint32_t vertex) {
+  const Eigen::Vector3f& p = mesh.positions[vertex];
+  Eigen::Vector3f n = Eigen::Vector3f::Zero();
+  Eigen::Vector2f uv = Eigen::Vector2f::Zero();
+  if (!mesh.normals.empty()) n = mesh.normals[vertex];
+  if (!mesh.uvs.empty()) uv = mesh.uvs[vertex];
+  return {p.x(), p.y(), p.z(), n.x(), n.y(), n.z(), uv.x(), uv.y()};
+}
+
+/// The first vertex that equals each one.
+std::vector<std::uint32_t> first_equals(const TriangleMesh& mesh) {
+  struct Hashed {
+    std::size_t hash;
+    std::uint32_t vertex;
+  };
+  std::vector<Hashed> sorted(mesh.positions.size());
+  tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(sorted.size()),
+                    [&](std::uint32_t i) {
+                      sorted[i] = {boost::hash_value(vertex_key(mesh, i)), i};
+                    });
+  tbb::parallel_sort(sorted, [&](const Hashed& a, const Hashed& b) {
+    if (a.hash != b.hash) return a.hash < b.hash;
+    const auto key_a = vertex_key(mesh, a.vertex);
+    const auto key_b = vertex_key(mesh, b.vertex);
+    return key_a != key_b ? key_a < key_b : a.vertex < b.vertex;
+  });
+  std::vector<std::uint32_t> result(sorted.size());
+  for (std::size_t i = 0; i < sorted.size(); ++i) {
+    const bool equals =
+        i > 0 && sorted[i].hash == sorted[i - 1].hash &&
+        vertex_key(mesh, sorted[i].vertex) == vertex_key(mesh, sorted[i - 1].vertex);
+    result[sorted[i].vertex] = equals ? result[sorted[i - 1].vertex] : sorted[i].vertex;
   }
+  return result;
 }
 
 /// One corner of one triangle, ordered by what makes two vertices the same.
@@ -89,6 +144,26 @@ void check_mesh(const TriangleMesh& mesh) {
                          ", but the mesh has only " + std::to_string(mesh.positions.size()));
   if (!all_finite(mesh.positions) || !all_finite(mesh.normals) || !all_finite(mesh.uvs))
     throw InputError("the mesh has a coordinate that is not finite");
+}
+
+void merge_equal_vertices(TriangleMesh& mesh) {
+  std::vector<std::uint32_t> merged = first_equals(mesh);
+  std::uint32_t count = 0;
+  for (std::uint32_t i = 0; i < merged.size(); ++i) {
+    if (merged[i] < i) {
+      merged[i] = merged[merged[i]];
+      continue;
+    }
+    mesh.positions[count] = mesh.positions[i];
+    if (!mesh.normals.empty()) mesh.normals[count] = mesh.normals[i];
+    if (!mesh.uvs.empty()) mesh.uvs[count] = mesh.uvs[i];
+    merged[i] = count++;
+  }
+  mesh.positions.resize(count);
+  if (!mesh.normals.empty()) mesh.normals.resize(count);
+  if (!mesh.uvs.empty()) mesh.uvs.resize(count);
+  for (auto& triangle : mesh.triangles)
+    for (std::uint32_t& vertex : triangle) vertex = merged[vertex];
 }
 
 void transform_mesh(TriangleMesh& mesh, const Eigen::Affine3d& to_world) {

@@ -19,6 +19,10 @@ struct ColoredMesh {
 /// finite.
 void check_mesh(const TriangleMesh& mesh);
 
+/// Vertices of equal position, normal and texture coordinates become one, in the order in which
+/// they first occur. All numbers must be finite.
+void merge_equal_vertices(TriangleMesh& mesh);
+
 /// Brings positions and normals from object to world space.
 void transform_mesh(TriangleMesh& mesh, const Eigen::Affine3d& to_world);
 

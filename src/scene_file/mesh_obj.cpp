@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mesh_obj.h"
 
+#include <tbb/parallel_pipeline.h>
 #include <tiny_obj_loader.h>
 
-#include <array>
+#include <cstdint>
 #include <fstream>
+#include <istream>
 #include <map>
+#include <sstream>
 #include <string>
 
 #include "driftlight/error.h"
@@ -14,23 +17,165 @@
 namespace driftlight {
 namespace {
 
-/// Collects what the parser calls back with.
+/// What some lines of the file say. Each statement tells how many values have come before it, so
+/// that pieces of a file can be parsed side by side and taken in order.
+struct Piece {
+  struct Counts {
+    std::size_t positions = 0;
+    std::size_t normals = 0;
+    std::size_t uvs = 0;
+  };
+  enum class Kind { Polygon, Group, Material, Library };
+  struct Statement {
+    Kind kind;
+    Counts before;
+    std::size_t first;  ///< of a polygon's corners, or the name
+    std::size_t count;  ///< of a polygon's corners
+  };
+
+  std::vector<Eigen::Vector3f> positions;
+  std::vector<Eigen::Vector3f> normals;
+  std::vector<Eigen::Vector2f> uvs;
+  std::vector<tinyobj::index_t> corners;
+  std::vector<std::string> names;
+  std::vector<Statement> statements;
+
+  Counts counts() const { return {positions.size(), normals.size(), uvs.size()}; }
+  void add_polygon(const tinyobj::index_t* polygon, int count) {
+    statements.push_back(
+        {Kind::Polygon, counts(), corners.size(), static_cast<std::size_t>(count)});
+    corners.insert(corners.end(), polygon, polygon + count);
+  }
+  void add(Kind kind, const std::string& name) {
+    statements.push_back({kind, counts(), names.size(), 0});
+    names.push_back(name);
+  }
+};
+
+Piece& parsed(void* user_data) { return *static_cast<Piece*>(user_data); }
+
+tinyobj::callback_t callbacks() {
+  tinyobj::callback_t result;
+  result.vertex_cb = [](void* data, float x, float y, float z, float) {
+    parsed(data).positions.emplace_back(x, y, z);
+  };
+  result.normal_cb = [](void* data, float x, float y, float z) {
+    parsed(data).normals.emplace_back(x, y, z);
+  };
+  result.texcoord_cb = [](void* data, float u, float v, float) {
+    parsed(data).uvs.emplace_back(u, v);
+  };
+  result.index_cb = [](void* data, tinyobj::index_t* corners, int count) {
+    parsed(data).add_polygon(corners, count);
+  };
+  result.group_cb = [](void* data, const char**, int) { parsed(data).add(Piece::Kind::Group, ""); };
+  result.usemtl_cb = [](void* data, const char* name, int) {
+    parsed(data).add(Piece::Kind::Material, name);
+  };
+  return result;
+}
+
+/// Notes the names of .mtl files and reads none.
+class LibraryNames : public tinyobj::MaterialReader {
+ public:
+  explicit LibraryNames(Piece& piece) : piece_(piece) {}
+  bool operator()(const std::string& name, std::vector<tinyobj::material_t>*,
+                  std::map<std::string, int>*, std::string*, std::string*) override {
+    piece_.add(Piece::Kind::Library, name);
+    return true;
+  }
+
+ private:
+  Piece& piece_;
+};
+
+Piece parse(const std::string& lines) {
+  Piece result;
+  LibraryNames libraries(result);
+  std::istringstream stream(lines);
+  tinyobj::LoadObjWithCallback(stream, callbacks(), &result, &libraries);
+  return result;
+}
+
+/// Whole lines, a megabyte or somewhat more; none at the end.
+std::string read_lines(std::istream& stream) {
+  constexpr std::size_t kSize = std::size_t{1} << 20U;
+  std::string lines(kSize, '\0');
+  stream.read(lines.data(), static_cast<std::streamsize>(lines.size()));
+  lines.resize(static_cast<std::size_t>(stream.gcount()));
+  std::string rest;
+  if (std::getline(stream, rest)) lines += rest + '\n';
+  return lines;
+}
+
+/// Makes meshes of pieces, in the order of the file.
 class ObjReader {
  public:
   explicit ObjReader(const ObjOptions& options) : options_(options) {}
 
-  void add_position(float x, float y, float z) { positions_.emplace_back(x, y, z); }
-  void add_normal(float x, float y, float z) { normals_.emplace_back(x, y, z); }
-  void add_uv(float u, float v) { uvs_.emplace_back(u, options_.flip_tex_coords ? 1 - v : v); }
+  void add(const Piece& piece) {
+    Piece::Counts taken;
+    for (const Piece::Statement& statement : piece.statements) {
+      add_values(piece, taken, statement.before);
+      taken = statement.before;
+      switch (statement.kind) {
+        case Piece::Kind::Polygon:
+          add_polygon(&piece.corners[statement.first], statement.count);
+          break;
+        case Piece::Kind::Group:
+          start_group();
+          break;
+        case Piece::Kind::Material:
+          start_material(piece.names[statement.first]);
+          break;
+        case Piece::Kind::Library:
+          file_.library = piece.names[statement.first];
+          break;
+      }
+    }
+    add_values(piece, taken, piece.counts());
+  }
+
+  ObjFile take() {
+    finish_mesh();
+    if (file_.parts.empty()) throw InputError("the file has no faces");
+    return std::move(file_);
+  }
+
+ private:
+  /// Indices from 0; kNone where a corner has no normal or texture coordinates.
+  struct Corner {
+    std::uint32_t position, normal, uv;
+    bool operator==(const Corner&) const = default;
+  };
+  static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+  /// The last corner at a position, by its part of the file, counted from 1, and its vertex there.
+  struct Seen {
+    std::size_t part = 0;
+    Corner corner{};
+    std::uint32_t vertex = 0;
+  };
+
+  void add_values(const Piece& piece, const Piece::Counts& from, const Piece::Counts& to) {
+    for (std::size_t i = from.positions; i < to.positions; ++i)
+      positions_.push_back(piece.positions[i]);
+    for (std::size_t i = from.normals; i < to.normals; ++i) normals_.push_back(piece.normals[i]);
+    for (std::size_t i = from.uvs; i < to.uvs; ++i) {
+      const Eigen::Vector2f& uv = piece.uvs[i];
+      uvs_.emplace_back(uv.x(), options_.flip_tex_coords ? 1 - uv.y() : uv.y());
+    }
+  }
 
   /// A fan, as Mitsuba makes of polygons.
-  void add_polygon(const tinyobj::index_t* corners, int count) {
+  void add_polygon(const tinyobj::index_t* corners, std::size_t count) {
     if (count < 3) throw InputError("a face has fewer than three corners");
-    std::vector<std::uint32_t> vertices;
-    vertices.reserve(static_cast<std::size_t>(count));
-    for (int i = 0; i < count; ++i) vertices.push_back(vertex(corners[i]));
-    for (std::size_t i = 2; i < vertices.size(); ++i)
-      mesh_.triangles.push_back({vertices[0], vertices[i - 1], vertices[i]});
+    const std::uint32_t first = vertex(corners[0]);
+    std::uint32_t last = vertex(corners[1]);
+    for (std::size_t i = 2; i < count; ++i) {
+      const std::uint32_t next = vertex(corners[i]);
+      mesh_.triangles.push_back({first, last, next});
+      last = next;
+    }
   }
 
   void start_group() {
@@ -40,48 +185,41 @@ class ObjReader {
     start_group();
     material_ = name.substr(0, name.find_last_not_of(" \t\r") + 1);
   }
-  void set_library(const std::string& name) { file_.library = name; }
-
-  ObjFile take() {
-    finish_mesh();
-    if (file_.parts.empty()) throw InputError("the file has no faces");
-    return std::move(file_);
-  }
-
- private:
-  /// Position, normal and texture coordinates; the latter two zero where absent.
-  using Key = std::array<float, 8>;
 
   /// From 1, or from the end if negative, to an index from 0.
   template <class T>
-  static std::size_t index(int from_one, const std::vector<T>& values, const std::string& what) {
+  static std::uint32_t index(int from_one, const std::vector<T>& values, const char* what) {
     const auto size = static_cast<long long>(values.size());
     const long long i = from_one < 0 ? size + from_one : from_one - 1LL;
     if (i < 0 || i >= size)
-      throw InputError("a face refers to " + what + " " + std::to_string(from_one) +
+      throw InputError("a face refers to " + std::string(what) + " " + std::to_string(from_one) +
                        ", but there are only " + std::to_string(size));
-    return static_cast<std::size_t>(i);
+    return static_cast<std::uint32_t>(i);
   }
 
-  std::uint32_t vertex(const tinyobj::index_t& corner) {
-    const Eigen::Vector3f p = positions_[index(corner.vertex_index, positions_, "vertex")];
-    Eigen::Vector3f n = Eigen::Vector3f::Zero();
-    Eigen::Vector2f uv = Eigen::Vector2f::Zero();
-    if (corner.normal_index != 0) n = normals_[index(corner.normal_index, normals_, "normal")];
-    if (corner.texcoord_index != 0)
-      uv = uvs_[index(corner.texcoord_index, uvs_, "texture coordinate")];
-    (corner.normal_index != 0 ? has_normals_ : lacks_normals_) = true;
-    has_uvs_ |= corner.texcoord_index != 0;
+  /// A new vertex, unless the corner is the one last seen at its position, as most are.
+  std::uint32_t vertex(const tinyobj::index_t& indices) {
+    Corner corner{index(indices.vertex_index, positions_, "vertex"), kNone, kNone};
+    if (indices.normal_index != 0) corner.normal = index(indices.normal_index, normals_, "normal");
+    if (indices.texcoord_index != 0)
+      corner.uv = index(indices.texcoord_index, uvs_, "texture coordinate");
+    if (seen_.size() < positions_.size()) seen_.resize(positions_.size());
+    Seen& seen = seen_[corner.position];
+    const std::size_t part = file_.parts.size() + 1;
+    if (seen.part != part || seen.corner != corner) seen = {part, corner, new_vertex(corner)};
+    return seen.vertex;
+  }
 
-    const Key key{p.x(), p.y(), p.z(), n.x(), n.y(), n.z(), uv.x(), uv.y()};
-    const auto next = static_cast<std::uint32_t>(mesh_.positions.size());
-    const auto [entry, is_new] = vertices_.emplace(key, next);
-    if (is_new) {
-      mesh_.positions.push_back(p);
-      mesh_.normals.push_back(n);
-      mesh_.uvs.push_back(uv);
-    }
-    return entry->second;
+  /// Normal and texture coordinates are zero where absent.
+  std::uint32_t new_vertex(const Corner& corner) {
+    const bool has_normal = corner.normal != kNone;
+    const bool has_uv = corner.uv != kNone;
+    (has_normal ? has_normals_ : lacks_normals_) = true;
+    has_uvs_ |= has_uv;
+    mesh_.positions.push_back(positions_[corner.position]);
+    mesh_.normals.push_back(has_normal ? normals_[corner.normal] : Eigen::Vector3f::Zero());
+    mesh_.uvs.push_back(has_uv ? uvs_[corner.uv] : Eigen::Vector2f::Zero());
+    return static_cast<std::uint32_t>(mesh_.positions.size() - 1);
   }
 
   void finish_mesh() {
@@ -91,9 +229,9 @@ class ObjReader {
     if (!has_normals_) mesh_.normals.clear();
     if (!has_uvs_) mesh_.uvs.clear();
     check_mesh(mesh_);
+    merge_equal_vertices(mesh_);
     file_.parts.push_back({std::move(mesh_), material_});
     mesh_ = {};
-    vertices_.clear();
     has_normals_ = lacks_normals_ = has_uvs_ = false;
   }
 
@@ -104,44 +242,28 @@ class ObjReader {
   ObjFile file_;
   TriangleMesh mesh_;
   std::string material_;
-  std::map<Key, std::uint32_t> vertices_;
+  std::vector<Seen> seen_;  ///< at each position
   bool has_normals_ = false;
   bool lacks_normals_ = false;
   bool has_uvs_ = false;
 };
 
-ObjReader& reader(void* user_data) { return *static_cast<ObjReader*>(user_data); }
-
-tinyobj::callback_t callbacks() {
-  tinyobj::callback_t result;
-  result.vertex_cb = [](void* data, float x, float y, float z, float) {
-    reader(data).add_position(x, y, z);
-  };
-  result.normal_cb = [](void* data, float x, float y, float z) {
-    reader(data).add_normal(x, y, z);
-  };
-  result.texcoord_cb = [](void* data, float u, float v, float) { reader(data).add_uv(u, v); };
-  result.index_cb = [](void* data, tinyobj::index_t* corners, int count) {
-    reader(data).add_polygon(corners, count);
-  };
-  result.group_cb = [](void* data, const char**, int) { reader(data).start_group(); };
-  result.usemtl_cb = [](void* data, const char* name, int) { reader(data).start_material(name); };
-  return result;
+/// Pieces are parsed side by side, some at a time, which bounds the memory.
+ObjFile read_pieces(std::istream& stream, const ObjOptions& options) {
+  constexpr std::size_t kAtATime = 16;
+  ObjReader reader(options);
+  tbb::parallel_pipeline(
+      kAtATime, tbb::make_filter<void, std::string>(tbb::filter_mode::serial_in_order,
+                                                    [&](tbb::flow_control& control) {
+                                                      std::string lines = read_lines(stream);
+                                                      if (lines.empty()) control.stop();
+                                                      return lines;
+                                                    }) &
+                    tbb::make_filter<std::string, Piece>(tbb::filter_mode::parallel, &parse) &
+                    tbb::make_filter<Piece, void>(tbb::filter_mode::serial_in_order,
+                                                  [&](const Piece& piece) { reader.add(piece); }));
+  return reader.take();
 }
-
-/// Notes the names of .mtl files and reads none.
-class LibraryNames : public tinyobj::MaterialReader {
- public:
-  explicit LibraryNames(ObjReader& reader) : reader_(reader) {}
-  bool operator()(const std::string& name, std::vector<tinyobj::material_t>*,
-                  std::map<std::string, int>*, std::string*, std::string*) override {
-    reader_.set_library(name);
-    return true;
-  }
-
- private:
-  ObjReader& reader_;
-};
 
 }  // namespace
 
@@ -150,10 +272,7 @@ ObjFile read_obj(const std::filesystem::path& file, const ObjOptions& options) {
   if (!stream || std::filesystem::is_directory(file))
     throw InputError("the mesh '" + file.string() + "' cannot be opened");
   try {
-    ObjReader reader(options);
-    LibraryNames libraries(reader);
-    tinyobj::LoadObjWithCallback(stream, callbacks(), &reader, &libraries);
-    return reader.take();
+    return read_pieces(stream, options);
   } catch (const InputError& error) {
     throw InputError("the mesh '" + file.string() + "' is not usable: " + error.what());
   }
