@@ -276,6 +276,29 @@ TEST(Spectra, AreReadFromFiles) {
   EXPECT_THROW(color("absent.spd"), SceneError);
 }
 
+// Mitsuba 0.5 interpolated from the wrong ends: here a line that rises from 400 to 700 nm falls.
+TEST(Spectra, AreBackwardsInFilesBefore06) {
+  const auto load = [](const std::string& version, const std::string& value) {
+    std::string file = complete(R"(<shape type="sphere"><bsdf type="diffuse">
+        <spectrum name="reflectance" value=")" +
+                                value + R"("/></bsdf></shape>)");
+    file.replace(file.find("0.6.0"), 5, version);
+    return SceneDirectory().load(file);
+  };
+  const auto color = [](const LoadedScene& loaded) {
+    return std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance.color;
+  };
+  const std::string list = "399.9:0, 400:0.1, 700:0.7, 700.1:0";
+  const LoadedScene forward = load("0.6.0", list);
+  const LoadedScene backward = load("0.5.0", list);
+  expect_near(color(backward), color(load("0.6.0", "399.9:0, 400:0.7, 700:0.1, 700.1:0")), 1e-3);
+  EXPECT_GT(color(forward).x(), color(backward).x());
+  EXPECT_TRUE(forward.notices.empty());
+  ASSERT_EQ(backward.notices.size(), 1U);
+  expect_contains(backward.notices[0], "Mitsuba 0.5");
+  EXPECT_TRUE(load("0.5.0", "0.5").notices.empty());
+}
+
 TEST(Spectra, SayWhatIsWrong) {
   const auto bad = [](const std::string& element) {
     return error_of(

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "../src/scene_file/cie_1931.h"
@@ -85,6 +86,26 @@ TEST(Spectrum, RampsToZeroOverTheMeanSpacing) {
 
 TEST(Spectrum, DoesNotRampFromZero) {
   EXPECT_EQ(ramp_to_zero({{400, 0}, {500, 2}, {700, 0}}).size(), 3U);
+}
+
+// By hand: a line from 1 to 3 and one from 3 to 0, each from the wrong end.
+TEST(Spectrum, BackwardsIsSwappedBetweenSamples) {
+  const Spectrum line = interpolated_backwards({{400, 1}, {500, 3}, {700, 0}});
+  ASSERT_EQ(line.size(), 4U);
+  const std::array<SpectrumSample, 4> expected{{{400, 3}, {500, 1}, {500, 0}, {700, 3}}};
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    EXPECT_EQ(line[i].wavelength, expected[i].wavelength);
+    EXPECT_EQ(line[i].value, expected[i].value);
+  }
+}
+
+// The light of the Cornell box, by the midpoint rule on a grid of 0.05 nm apart from this code. In
+// line with its samples it would be (20.78, 10.85, 2.771).
+TEST(Spectrum, LightOfTheCornellBoxBackwards) {
+  const Spectrum light = ramp_to_zero({{400, 0}, {500, 8}, {600, 15.6}, {700, 18.4}});
+  expect_near(spectrum_to_rgb(interpolated_backwards(light)), Rgbd(18.38605, 10.98827, 2.753473),
+              1e-4);
+  expect_near(spectrum_to_rgb(light), Rgbd(20.77976, 10.84758, 2.770555), 1e-4);
 }
 
 TEST(Srgb, HasItsPublishedValues) {

@@ -9,6 +9,8 @@ std::optional<Dialect> dialect_of(std::string_view version) {
   return std::nullopt;
 }
 
+bool has_backward_spectra(std::string_view version) { return version.starts_with("0.5."); }
+
 std::string snake_case(std::string_view name) {
   const auto is_capital = [](char c) { return c >= 'A' && c <= 'Z'; };
   std::string result;

@@ -18,6 +18,10 @@ enum class Dialect {
 /// By the attribute `version` of <scene>; nothing if we read neither.
 std::optional<Dialect> dialect_of(std::string_view version);
 
+/// True for versions whose Mitsuba interpolated lists of wavelengths from the wrong ends, see
+/// interpolated_backwards().
+bool has_backward_spectra(std::string_view version);
+
 /// A name such as "intIOR" in the spelling of the newer dialect, "int_ior". A name without capitals
 /// stays as it is.
 std::string snake_case(std::string_view name);

@@ -32,6 +32,16 @@ bool contains(const Element& element, std::string_view tag) {
                      [&](const Element& child) { return child.tag() == tag; });
 }
 
+/// True if a spectrum in the element is a list of wavelengths or a file of such.
+bool has_wavelengths(const Element& element) {
+  const std::vector<Element> children = element.children();
+  return std::any_of(children.begin(), children.end(), [](const Element& child) {
+    const bool lists = child.find("filename").has_value() ||
+                       child.find("value").value_or("").find(':') != std::string::npos;
+    return (child.tag() == "spectrum" && lists) || has_wavelengths(child);
+  });
+}
+
 /// Reads one scene: the elements of its file, from top to bottom, into a SceneBuilder.
 class SceneLoader {
  public:
@@ -67,6 +77,10 @@ class SceneLoader {
     open_files_.push_back(file);
     for (const Element& element : scene.children()) read(element);
     open_files_.pop_back();
+    if (has_backward_spectra(version) && has_wavelengths(scene))
+      context_.notice(scene,
+                      "spectra are interpolated as Mitsuba 0.5 did, between two samples from "
+                      "the wrong ends; version=\"0.6.0\" has straight lines");
     return scene;
   }
 

@@ -90,6 +90,15 @@ Spectrum ramp_to_zero(Spectrum spectrum) {
   return spectrum;
 }
 
+Spectrum interpolated_backwards(const Spectrum& spectrum) {
+  Spectrum result;
+  for (std::size_t i = 1; i < spectrum.size(); ++i) {
+    result.push_back({spectrum[i - 1].wavelength, spectrum[i].value});
+    result.push_back({spectrum[i].wavelength, spectrum[i - 1].value});
+  }
+  return result;
+}
+
 Rgbd spectrum_to_rgb(const Spectrum& spectrum) {
   return xyz_to_rgb(relative_xyz(spectrum, &white_light)).max(0.0);
 }

@@ -13,12 +13,18 @@ struct SpectrumSample {
   double value = 0;
 };
 
-/// Linear between the samples (at least two, by growing wavelength), zero outside of them.
+/// Linear between the samples (at least two, by growing wavelength; two of the same are a jump),
+/// zero outside of them.
 using Spectrum = std::vector<SpectrumSample>;
 
 /// The spectrum with a ramp at each end that is not zero: down to zero over the mean spacing of the
 /// samples, which is how Mitsuba continues lists in scene files.
 Spectrum ramp_to_zero(Spectrum spectrum);
+
+/// Between two samples the line that has the values of each at the other. So Mitsuba interpolated
+/// until 2020 (commit cfeb776 mended InterpolatedSpectrum::eval), versions 0.5 and before for ever:
+/// of a list by steps of 100 nm that makes a tenth, of one by 5 nm nothing that matters.
+Spectrum interpolated_backwards(const Spectrum& spectrum);
 
 /// Linear sRGB of a spectrum, as a Mitsuba of three channels sees it: XYZ is the integral of the
 /// spectrum times the CIE 1931 matching functions, over the integral of y; exact for the piecewise

@@ -31,8 +31,11 @@ class SpectrumReader {
   /// The colour of all samples.
   Rgbd color() {
     if (spectrum_.size() < 2) element_.fail("a spectrum needs at least two wavelengths");
-    if (element_.dialect() == Dialect::Mitsuba06)
-      return spectrum_to_rgb(ramp_to_zero(std::move(spectrum_)));
+    if (element_.dialect() == Dialect::Mitsuba06) {
+      const Spectrum spectrum = ramp_to_zero(std::move(spectrum_));
+      return spectrum_to_rgb(
+          has_backward_spectra(element_.version()) ? interpolated_backwards(spectrum) : spectrum);
+    }
     return element_.parent_tag() == "emitter" ? spectrum_to_rgb(spectrum_)
                                               : reflectance_to_rgb(spectrum_);
   }
