@@ -104,7 +104,7 @@ TEST(ObjFile, MergesEqualVertices) {
   EXPECT_EQ(mesh.triangles, expected);
 }
 
-// Files are parsed a megabyte at a time, here amid squares, whose indices count from the end.
+// Files are parsed in pieces, here cut amid squares, whose indices count from the end.
 TEST(ObjFile, LargeFilesAreReadInOrder) {
   constexpr int kSquares = 40000;
   std::string file;

@@ -97,9 +97,9 @@ Piece parse(const std::string& lines) {
   return result;
 }
 
-/// Whole lines, a megabyte or somewhat more; none at the end.
+/// Whole lines, 64 KiB or somewhat more; none at the end.
 std::string read_lines(std::istream& stream) {
-  constexpr std::size_t kSize = std::size_t{1} << 20U;
+  constexpr std::size_t kSize = std::size_t{1} << 16U;
   std::string lines(kSize, '\0');
   stream.read(lines.data(), static_cast<std::streamsize>(lines.size()));
   lines.resize(static_cast<std::size_t>(stream.gcount()));
