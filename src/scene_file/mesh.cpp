@@ -167,10 +167,13 @@ void merge_equal_vertices(TriangleMesh& mesh) {
 }
 
 void transform_mesh(TriangleMesh& mesh, const Eigen::Affine3d& to_world) {
-  for (Eigen::Vector3f& p : mesh.positions) p = (to_world * p.cast<double>()).cast<float>();
+  tbb::parallel_for(std::size_t{0}, mesh.positions.size(), [&](std::size_t i) {
+    mesh.positions[i] = (to_world * mesh.positions[i].cast<double>()).cast<float>();
+  });
   const Eigen::Matrix3d normal_to_world = to_world.linear().inverse().transpose();
-  for (Eigen::Vector3f& n : mesh.normals)
-    n = (normal_to_world * n.cast<double>()).normalized().cast<float>();
+  tbb::parallel_for(std::size_t{0}, mesh.normals.size(), [&](std::size_t i) {
+    mesh.normals[i] = (normal_to_world * mesh.normals[i].cast<double>()).normalized().cast<float>();
+  });
 }
 
 void reverse_winding(TriangleMesh& mesh) {

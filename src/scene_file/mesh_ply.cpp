@@ -194,6 +194,7 @@ class PlyReader {
       throw InputError("its faces lack the list 'vertex_indices'");
     for (const PlyProperty& property : element.properties)
       if (!is_polygon(property)) file_.unused.push_back("face " + property.name);
+    file_.mesh.triangles.reserve(element.count);
     for (std::uint64_t i = 0; i < element.count; ++i)
       for (const PlyProperty& property : element.properties) {
         if (is_polygon(property))
