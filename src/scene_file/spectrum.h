@@ -23,7 +23,8 @@ Spectrum ramp_to_zero(Spectrum spectrum);
 
 /// Between two samples the line that has the values of each at the other. So Mitsuba interpolated
 /// until 2020 (commit cfeb776 mended InterpolatedSpectrum::eval), versions 0.5 and before for ever:
-/// of a list by steps of 100 nm that makes a tenth, of one by 5 nm nothing that matters.
+/// in the Cornell box that makes a tenth of a list in steps of 100 nm, and 0.6 % at most of a
+/// channel of one in steps of 4 nm.
 Spectrum interpolated_backwards(const Spectrum& spectrum);
 
 /// Linear sRGB of a spectrum, as a Mitsuba of three channels sees it: XYZ is the integral of the

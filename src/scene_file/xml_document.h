@@ -69,7 +69,9 @@ class Element {
   std::string parent_tag() const { return node_.parent().name(); }
   Dialect dialect() const { return document_->dialect(); }
   /// Of the file, as its outermost element says.
-  std::string version() const { return document_->root().attribute("version").value(); }
+  std::string version() const {
+    return Element(*document_, document_->root(), *surroundings_).text("version");
+  }
   std::optional<std::string> find(const char* attribute) const;
   /// The same, and throws SceneError if it is missing.
   std::string text(const char* attribute) const;
