@@ -9,16 +9,16 @@
 
 namespace driftlight {
 
-/// Least deposit of a mutation, in units of the brightness of a pixel's sample: below it more
-/// mutations no longer pay.
-inline constexpr double kLeastDeposit = 0.2;
-/// What a mutation costs in bidirectional samples.
+/// What a Langevin step costs in bidirectional samples, and what a perturbation does.
 inline constexpr double kMutationCost = 0.3;
+inline constexpr double kPerturbationCost = 0.15;
 
-/// Deposit of a mutation where samples leave so much light in the mean, for at most so many
-/// mutations a sample.
+/// Deposit of a mutation where samples leave so much light in the mean, in units of the brightness
+/// about, for at most so many mutations a sample. Where they leave little more mutations no longer
+/// pay.
 inline double deposit_for(double mean_light, double mutations_per_sample) {
-  return std::max(kLeastDeposit, mean_light / mutations_per_sample);
+  constexpr double kLittle = 0.8;
+  return std::max(kLittle, mean_light) / mutations_per_sample;
 }
 
 /// `chains` of `mutations` each; every mutation deposits `deposit`. In the mean over u they deposit

@@ -12,10 +12,12 @@
 #include "direct_pass.h"
 #include "driftlight/error.h"
 #include "driftlight/film.h"
+#include "driftlight/small_step.h"
 #include "exact_sum.h"
+#include "mutation_loop.h"
 #include "pass_loop.h"
+#include "path_mutation.h"
 #include "sample_film.h"
-#include "veach_chain.h"
 #include "vertex_path.h"
 
 namespace driftlight {
@@ -110,7 +112,7 @@ class EnergySampler {
     Sink sink{*this, film, film_sink};
     tracer_.sample(film, rng, sink);
     LangevinStatistics statistics;
-    for (const Start& start : starts_) redistribute(start, rng, statistics);
+    for (Start& start : starts_) redistribute(start, rng, statistics);
     if (!starts_.empty()) energy_.count(statistics);
   }
 
@@ -145,7 +147,7 @@ class EnergySampler {
   }
 
   /// By chains of mutations that deposit e_d each.
-  void redistribute(const Start& start, Rng& rng, LangevinStatistics& statistics) {
+  void redistribute(Start& start, Rng& rng, LangevinStatistics& statistics) {
     const auto [chains, mutations, deposit] =
         schedule_chains(start.value, energy_.deposit, energy_.options.chain_length, rng);
     if (chains > 0.0) ++statistics.starts;
@@ -154,31 +156,24 @@ class EnergySampler {
           statistics);
   }
 
-  void run(const VertexPath& start, std::uint64_t mutations, double weight, Rng& rng,
+  void run(VertexPath& start, std::uint64_t mutations, double weight, Rng& rng,
            LangevinStatistics& statistics) {
-    const VertexPath* from = &start;
-    VertexPath* to = &paths_[0];
-    double gathered = 0;
-    const auto splat = [&](const VertexPath& at, double share) {
-      const Contribution& value = at.contribution();
-      if (share > 0.0) energy_.film.splat(value.film, value.color, share * weight);
-    };
-    for (std::uint64_t i = 0; i < mutations; ++i) {
-      const double acceptance = perturb(energy_.mutation, *from, *to, rng, statistics.rejections);
+    const auto propose = [&](const VertexPath& x, VertexPath& y) {
+      MutationDensities densities;
       ++statistics.small_step.proposed;
+      if (!succeeded(energy_.mutation.perturb(x, y, densities, rng), statistics.rejections))
+        return 0.0;
+      const double acceptance =
+          acceptance_of(x.contribution().log_target, y.contribution().log_target, densities,
+                        statistics.rejections);
       statistics.small_step.accepted += acceptance;
-      gathered += 1.0 - acceptance;
-      if (rng.uniform() < acceptance) {
-        splat(*from, gathered);
-        from = to;
-        to = to == &paths_[0] ? &paths_[1] : &paths_[0];
-        gathered = acceptance;
-      } else {
-        splat(*to, acceptance);
-        if (acceptance > 0.0) ++statistics.rejections.hastings;
-      }
-    }
-    splat(*from, gathered);
+      return acceptance;
+    };
+    statistics.rejections.hastings += run_mutations(
+        start, paths_, mutations, rng, propose, [&](const VertexPath& at, double share) {
+          const Contribution& value = at.contribution();
+          energy_.film.splat(value.film, value.color, share * weight);
+        });
   }
 
   Energy& energy_;
@@ -192,7 +187,7 @@ class EnergySampler {
 LangevinResult render_erpt(const Scene& scene, const ErptOptions& options,
                            const RenderOptions& render, int samples_per_pixel) {
   options.validate();
-  require_pinhole(scene, "erpt");
+  require_pinhole(scene, "the integrator 'erpt'");
   LangevinResult result;
   tbb::task_arena arena(render.threads > 0 ? render.threads : tbb::task_arena::automatic);
   arena.execute([&] {

@@ -167,8 +167,12 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
                      "a pilot"),
       number("chain_length", redistribution.chain_length, Range<int>{1, 1000000},
              "redistribution: mutations of a chain"),
-      number("mutations_per_sample", redistribution.mutations_per_sample, positive,
-             "redistribution: most mutations for each sample, in the mean"),
+      number_or_auto("mutations_per_sample", redistribution.mutations_per_sample, positive,
+                     "redistribution: most mutations for each sample, in the mean; auto: from a "
+                     "pilot"),
+      number_or_auto("perturbations", redistribution.perturbations, Range<double>{0, 1},
+                     "redistribution: share of the starts whose chains move by the perturbations "
+                     "of mlt; auto: from a pilot"),
       choice("guide", redistribution.guide, std::array<std::string_view, 2>{"off", "on"},
              "redistribution: light subpaths start where a pilot has found that light comes from"),
       number_or_auto("light_subpaths", redistribution.light_subpaths, Range<double>{0, 1, true},

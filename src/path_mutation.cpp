@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "driftlight/small_step.h"
 #include "sensor_connection.h"
 
 namespace driftlight {
@@ -90,6 +91,16 @@ void copy_vertices(const VertexPath& x, int first, int last, VertexPath& y, int 
 }
 
 }  // namespace
+
+double acceptance_of(double log_pi_x, double log_pi_y, const MutationDensities& densities,
+                     Rejections& rejections) {
+  if (!std::isfinite(log_pi_y) || !std::isfinite(densities.forward) ||
+      std::isnan(densities.reverse)) {
+    ++rejections.non_finite;
+    return 0.0;
+  }
+  return std::exp(log_acceptance(log_pi_x, log_pi_y, densities.forward, densities.reverse));
+}
 
 PathMutation::PathMutation(const Scene& scene, const MutationLimits& limits)
     : scene_(scene), limits_(limits) {}
@@ -362,6 +373,12 @@ TraceStatus PathMutation::from_sensor(const VertexPath& x, VertexPath& y,
 }
 
 bool PathMutation::has_caustic(const VertexPath& x) { return x.edges > 1 && !x(1).delta; }
+
+TraceStatus PathMutation::perturb(const VertexPath& x, VertexPath& y, MutationDensities& densities,
+                                  Rng& rng) const {
+  return has_caustic(x) && rng.uniform() < 0.5 ? caustic(x, y, densities, rng)
+                                               : from_sensor(x, y, densities, rng);
+}
 
 /// The ray from x_m toward the sensor, moved.
 RayFollower PathMutation::moved_from_light(const VertexPath& x, int m, Rng& rng) const {

@@ -32,6 +32,7 @@
 
 #include "driftlight/phase_space.h"
 #include "driftlight/random.h"
+#include "driftlight/render.h"
 #include "vertex_path.h"
 
 namespace driftlight {
@@ -60,6 +61,11 @@ struct MutationDensities {
   double reverse = 0;
 };
 
+/// The probability of acceptance min(1, pi(y) T(x | y) / (pi(x) T(y | x))), pi(x) positive, in the
+/// measure of vertex_path.h. What is not finite, of y or of T, is counted and never accepted.
+double acceptance_of(double log_pi_x, double log_pi_y, const MutationDensities& densities,
+                     Rejections& rejections);
+
 class PathMutation {
  public:
   PathMutation(const Scene& scene, const MutationLimits& limits);
@@ -74,6 +80,10 @@ class PathMutation {
   TraceStatus caustic(const VertexPath& x, VertexPath& y, MutationDensities& densities,
                       Rng& rng) const;
   static bool has_caustic(const VertexPath& x);
+  /// One of the perturbations of x, the two equally likely where it has both. They keep what this
+  /// depends on, so each kind is in detailed balance by itself.
+  TraceStatus perturb(const VertexPath& x, VertexPath& y, MutationDensities& densities,
+                      Rng& rng) const;
 
   // The parts of the bidirectional mutation.
 

@@ -29,14 +29,15 @@ std::uint64_t key(const Contribution& start) {
 
 }  // namespace
 
-ProbedStarts::ProbedStarts(const Scene& scene, const LangevinOptions& options, std::uint64_t seed)
-    : scene_(scene), options_(options), seed_(seed) {}
+ProbedStarts::ProbedStarts(const Scene& scene, const LangevinOptions& options,
+                           double mutations_of_pass, std::uint64_t seed)
+    : scene_(scene),
+      options_(options),
+      starts_of_pass_(mutations_of_pass / options.redistribution.chain_length),
+      seed_(seed) {}
 
 void ProbedStarts::begin_pass(std::uint64_t index) {
-  const RedistributionOptions& chains = options_.redistribution;
-  const double starts_of_pass =
-      scene_.camera().pixel_count() * chains.mutations_per_sample / chains.chain_length;
-  chance_ = kStarts / (starts_of_pass * static_cast<double>(index + 1));
+  chance_ = kStarts / (starts_of_pass_ * static_cast<double>(index + 1));
 }
 
 std::optional<GradientProbe> ProbedStarts::probe(const Contribution& start,

@@ -17,7 +17,9 @@ namespace driftlight {
 /// in proportion to 1 / (k + 1): a short render is checked well and a long one takes little longer.
 class ProbedStarts {
  public:
-  ProbedStarts(const Scene& scene, const LangevinOptions& options, std::uint64_t seed);
+  /// Chains make at most so many mutations in a pass, in the mean.
+  ProbedStarts(const Scene& scene, const LangevinOptions& options, double mutations_of_pass,
+               std::uint64_t seed);
 
   /// Between passes only.
   void begin_pass(std::uint64_t index);
@@ -34,6 +36,7 @@ class ProbedStarts {
  private:
   const Scene& scene_;
   const LangevinOptions& options_;
+  double starts_of_pass_;
   std::uint64_t seed_;
   double chance_ = 0;  ///< of a start in this pass
   std::mutex mutex_;

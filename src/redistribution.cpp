@@ -7,19 +7,19 @@
 #include <optional>
 #include <string>
 #include <utility>
-#include <vector>
 
+#include "chain_pilot.h"
 #include "chain_schedule.h"
 #include "driftlight/error.h"
 #include "driftlight/film.h"
 #include "exact_sum.h"
 #include "pass_loop.h"
+#include "perturbation_chain.h"
 #include "pilot.h"
 #include "probed_starts.h"
 #include "remainder.h"
 #include "sample_film.h"
 #include "splitting_share.h"
-#include "threshold_pilot.h"
 
 namespace driftlight {
 namespace {
@@ -33,6 +33,7 @@ struct Redistribution {
   Remainder remainder;
   Film film;  ///< of the chains, in units of `unit`
   SplittingShare splitting;
+  ChainPlan plan;
   double unit;
   double deposit;  ///< epsilon
   ExactSum remainders;
@@ -44,20 +45,21 @@ struct Redistribution {
         layers(render.layers),
         pilot(run_pilot(scene, options, render.seed)),
         remainder(scene, pilot.guide, pilot.brightness,
-                  options.redistribution.threshold.value_or(kLeastThreshold)),
+                  options.redistribution.threshold.value_or(1.0)),
         film(scene.camera().film_width, scene.camera().film_height, scene.camera().filter),
         splitting(scene, options, render, remainder, pilot.brightness),
+        plan(plan_chains(scene, options, pilot, splitting, render.seed)),
         unit(pilot.brightness.film_unit()),
-        deposit(kLeastDeposit) {
-    if (render.check_gradients) probed.emplace(scene, options, render.seed);
-    if (!options.redistribution.threshold)
-      remainder.set_tau(choose_threshold(scene, options, pilot, remainder, splitting, render.seed));
+        deposit(deposit_for(0.0, plan.mutations_per_sample)) {
+    remainder.set_tau(plan.threshold);
+    if (render.check_gradients)
+      probed.emplace(scene, options, scene.camera().pixel_count() * plan.mutations_per_sample,
+                     render.seed);
   }
 
   /// From the mean remainder of a sample so far.
   void set_deposit(double samples) {
-    deposit =
-        deposit_for(remainders.value() / samples, options.redistribution.mutations_per_sample);
+    deposit = deposit_for(remainders.value() / samples, plan.mutations_per_sample);
   }
 
   /// Of the films, in the mean of so many passes.
@@ -72,12 +74,12 @@ struct Redistribution {
     return image;
   }
 
-  void count(const ChainFigures& figures) {
+  void count(const ChainFigures& figures, std::uint64_t starts) {
     accepted_.add(figures.small_step.accepted);
     const std::lock_guard lock(mutex_);
     statistics_.small_step.proposed += figures.small_step.proposed;
     statistics_.rejections += figures.rejections;
-    ++statistics_.starts;
+    statistics_.starts += starts;
   }
   /// Of the chains.
   LangevinStatistics statistics() const {
@@ -99,73 +101,106 @@ class RedistributionSampler {
       : common_(common),
         tracer_(common.scene, common.pilot.guide, MisHeuristic::Balance, common.options.max_depth),
         chain_(common.scene, common.options.kernel, common.remainder, common.layers),
+        perturbations_(common.scene, common.remainder, common.options.max_depth),
         splitting_(common.splitting) {}
 
   void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& film_sink) {
-    starts_.clear();
-    Sink sink{*this, film, film_sink};
+    left_ = 0.0;
+    starts_ = 0;
+    Sink sink{*this, film, rng, film_sink};
     tracer_.sample(film, rng, sink);
-    for (const Start& start : starts_) spread(start, rng);
+    if (left_ > 0.0) common_.remainders.add(left_);
+    if (starts_ > 0) {
+      common_.count(chain_.take_statistics(), starts_);
+      common_.count(perturbations_.take_statistics(), 0);
+    }
     splitting_.sample(film, rng);
   }
 
  private:
-  struct Start {
-    BrightPath path;
-    double remainder;  ///< times its roulette
-  };
-
   /// Puts on the film what samples carry.
   struct Sink {
     RedistributionSampler& sampler;
     Vec2d film;
+    Rng& rng;
     SampleFilm::Sink& film_sink;
 
     void add(const Rgbd& value, const FoundPath& path) {
-      film_sink.add(value * sampler.share_of_sample(film, value, path));
+      film_sink.add(value * sampler.share_of_sample(film, value, path, rng));
     }
     void splat(const Vec2d& at, const Rgbd& value, const FoundPath& path) {
-      film_sink.splat(at, value * sampler.share_of_sample(at, value, path));
+      film_sink.splat(at, value * sampler.share_of_sample(at, value, path, rng));
     }
   };
 
-  /// min(w, tau) / w; keeps the path as a start if that is below 1.
-  double share_of_sample(const Vec2d& film, const Rgbd& value, const FoundPath& path) {
+  /// min(w, tau) / w; what is left is spread at once.
+  double share_of_sample(const Vec2d& film, const Rgbd& value, const FoundPath& path, Rng& rng) {
     const double w = common_.remainder.weight(film, value, path);
-    const auto bright = common_.remainder.bright_path(w, path, common_.options.phase_space);
-    if (!bright) return 1.0;
-    if (!common_.splitting.takes(bright->topology))
-      starts_.push_back({*bright, path.roulette * bright->share.excess()});
-    return bright->share.tau / bright->share.w;
+    const double left = common_.remainder.left(w, path);
+    if (!(left > 0.0)) return 1.0;
+    if (!common_.splitting.takes(path)) {
+      left_ += left;
+      spread(film, value, left, path, rng);
+    }
+    return 1.0 - left / (path.roulette * w);
   }
 
   /// By chains of mutations that deposit epsilon each.
-  void spread(const Start& start, Rng& rng) {
-    common_.remainders.add(start.remainder);
+  void spread(const Vec2d& film, const Rgbd& value, double left, const FoundPath& path, Rng& rng) {
     const double length = common_.options.redistribution.chain_length;
-    const ChainSchedule plan = schedule_chains(start.remainder, common_.deposit, length, rng);
-    if (!(plan.chains > 0.0)) return;
+    const ChainSchedule schedule = schedule_chains(left, common_.deposit, length, rng);
+    if (!(schedule.chains > 0.0)) return;
+    ++starts_;
+    const auto deposit = [&](const Share& share, const Rgbd& color, double weight) {
+      common_.film.splat(share.film, color,
+                         weight * schedule.deposit * share.brightness / common_.unit);
+    };
+    const bool perturbed = rng.uniform() < common_.plan.perturbations;
+    if (perturbed ? perturb(schedule, path, rng, deposit) : move(schedule, path, rng, deposit))
+      return;
+    // No state of a chain: as if it never moved.
+    Share stays;
+    stays.film = film;
+    stays.brightness = common_.pilot.brightness(film);
+    deposit(stays, value / luminance(value), schedule.chains * schedule.mutations);
+  }
+
+  /// False if the path is no state of such a chain.
+  template <class Deposit>
+  bool perturb(const ChainSchedule& schedule, const FoundPath& path, Rng& rng,
+               const Deposit& deposit) {
+    if (!perturbations_.start_at(path)) return false;
+    for (double i = 0; i < schedule.chains; ++i)
+      perturbations_.run(static_cast<std::uint64_t>(schedule.mutations), rng, deposit);
+    return true;
+  }
+
+  /// The same by Langevin steps.
+  template <class Deposit>
+  bool move(const ChainSchedule& schedule, const FoundPath& path, Rng& rng,
+            const Deposit& deposit) {
+    const auto start = common_.remainder.bright_path(path, common_.options.phase_space);
+    if (!start) return false;
     std::optional<GradientProbe> probe =
         common_.probed
-            ? common_.probed->probe(start.path.contribution, plan.chains * plan.mutations)
+            ? common_.probed->probe(start->contribution, schedule.chains * schedule.mutations)
             : std::nullopt;
     chain_.observe(probe ? &*probe : nullptr);
-    chain_.start_at(start.path);
-    for (double i = 0; i < plan.chains; ++i)
-      chain_.run(static_cast<std::uint64_t>(plan.mutations), rng,
-                 [&](const Share& share, const Rgbd& color, double weight) {
-                   common_.film.splat(share.film, color,
-                                      weight * plan.deposit * share.brightness / common_.unit);
-                 });
-    common_.count(chain_.take_statistics());
+    chain_.start_at(*start);
+    for (double i = 0; i < schedule.chains; ++i)
+      chain_.run(static_cast<std::uint64_t>(schedule.mutations), rng, deposit);
     if (probe) common_.probed->take(*probe);
+    return true;
   }
 
   Redistribution& common_;
   BidirectionalTracer tracer_;
   RemainderChain chain_;
+  PerturbationChain perturbations_;
   SplittingShare::Sampler splitting_;
-  std::vector<Start> starts_;
+  // Of the sample in hand.
+  double left_ = 0;  ///< to chains
+  std::uint64_t starts_ = 0;
 };
 
 /// What each way of carrying light has on the film, and the families of particles.
@@ -190,6 +225,8 @@ Layers shares(const Image& samples, const Image& chains, const Image& particles,
 
 LangevinResult render_redistribution(const Scene& scene, const LangevinOptions& options,
                                      const RenderOptions& render, double samples_per_pixel) {
+  if (options.redistribution.perturbations.value_or(0.0) > 0.0)
+    require_pinhole(scene, "option perturbations");
   RenderClock clock(render);
   Redistribution common(scene, options, render);
   const double pilot_seconds = clock.seconds();
@@ -219,7 +256,9 @@ LangevinResult render_redistribution(const Scene& scene, const LangevinOptions& 
   if (!(result.statistics.b > 0.0) && !samples.stopped)
     throw InputError("no path from the sensor to an emitter carries light");
   result.statistics.remainder = mean_luminance(chains);
-  result.statistics.threshold = common.remainder.tau();
+  result.statistics.threshold = common.plan.threshold;
+  result.statistics.perturbations = common.plan.perturbations;
+  result.statistics.mutations_per_sample = common.plan.mutations_per_sample;
   result.statistics.light_subpaths = common.pilot.guide.rate();
   result.statistics.samples_per_pixel = samples.samples_per_pixel;
   result.statistics.stopped = samples.stopped;

@@ -10,14 +10,16 @@ namespace {
 
 /// Brighter paths are left to the samples: chains sum in fixed point.
 constexpr double kMostW = 1e9;
-/// tau of emitters that are seen directly, over that of other light.
-constexpr double kSeenTau = 16;
 
 }  // namespace
 
-std::optional<BrightPath> Remainder::bright_path(double weight, const FoundPath& path,
+double Remainder::left(double weight, const FoundPath& path) const {
+  const double tau = this->tau(path.s + path.t - 1);
+  return weight > tau && weight < kMostW ? path.roulette * (weight - tau) : 0.0;
+}
+
+std::optional<BrightPath> Remainder::bright_path(const FoundPath& path,
                                                  PhaseSpace phase_space) const {
-  if (!(weight > tau_)) return std::nullopt;
   const auto sample = state_of(scene_, path, phase_space);
   if (!sample) return std::nullopt;
   BrightPath bright{sample->topology, sample->coordinates,
@@ -35,14 +37,22 @@ Share Remainder::share(const PathTopology& topology, const PathCoordinates& coor
   double q = densities.by_light_vertices[0];
   for (int s = 1; s <= n && n > 1; ++s)
     q += densities.by_light_vertices[static_cast<std::size_t>(s)];
+  return share(n, contribution, std::log(q));
+}
+
+Share Remainder::share(const VertexPath& path) const {
+  return share(path.edges, path.contribution(), log_density(path, guide_));
+}
+
+Share Remainder::share(int edges, const Contribution& contribution, double log_q) const {
   Share share;
   share.film = contribution.film;
   share.brightness = brightness_(share.film);
-  share.w = std::exp(contribution.log_target - std::log(q * share.brightness));
-  share.tau = n > 1 ? tau_ : kSeenTau * tau_;
-  const bool remains = share.w < kMostW && std::isfinite(q);
+  share.w = std::exp(contribution.log_target - log_q - std::log(share.brightness));
+  share.tau = tau(edges);
+  const bool remains = share.w < kMostW && std::isfinite(log_q);
   share.log_remainder =
-      remains ? std::log(q) + std::log(share.excess()) : -std::numeric_limits<double>::infinity();
+      remains ? log_q + std::log(share.excess()) : -std::numeric_limits<double>::infinity();
   return share;
 }
 

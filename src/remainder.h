@@ -14,6 +14,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <utility>
 
@@ -21,6 +22,8 @@
 #include "driftlight/small_step.h"
 #include "emission_guide.h"
 #include "found_path.h"
+#include "mutation_loop.h"
+#include "vertex_path.h"
 
 namespace driftlight {
 
@@ -54,20 +57,30 @@ class Remainder {
   /// The least tau.
   double tau() const { return tau_; }
   void set_tau(double tau) { tau_ = tau; }
+  /// That of paths of so many edges.
+  double tau(int edges) const { return edges > 1 ? tau_ : tau_seen(tau_); }
+  /// Of paths of one edge, where that of others is tau.
+  static double tau_seen(double tau) { return 16.0 * std::max(1.0, tau); }
   /// w of what a sample has found at the film point, `value` with balance weights.
   double weight(const Vec2d& film, const Rgbd& value, const FoundPath& path) const {
     return luminance(value) / (path.roulette * brightness_(film));
   }
-  /// The path of that weight, if samples do not carry it whole: it may have no coordinates in the
-  /// phase space, or no remainder.
-  std::optional<BrightPath> bright_path(double weight, const FoundPath& path,
-                                        PhaseSpace phase_space) const;
-  /// Of a path with light. A path so bright that sums might overflow, or whose density is not
-  /// finite, has no remainder: samples carry it whole.
+  /// What samples leave of a path of that weight, times its roulette: 0 where they carry it whole,
+  /// as they do what is so bright that sums might overflow.
+  double left(double weight, const FoundPath& path) const;
+  /// The path with coordinates of the phase space; none if it has none there, or if by rounding
+  /// nothing of it remains.
+  std::optional<BrightPath> bright_path(const FoundPath& path, PhaseSpace phase_space) const;
+  /// Of a path with light. One that is too bright, or whose density is not finite, has no
+  /// remainder.
   Share share(const PathTopology& topology, const PathCoordinates& coordinates,
               const Contribution& contribution) const;
+  /// The same of an evaluated path in the measure of vertex_path.h.
+  Share share(const VertexPath& path) const;
 
  private:
+  Share share(int edges, const Contribution& contribution, double log_q) const;
+
   const Scene& scene_;
   const EmissionGuide& guide_;
   const BrightnessMap& brightness_;
@@ -114,34 +127,21 @@ class RemainderChain {
   SmallStep small_step_;
   StepLayers* layers_;
   Visit start_;
-  Visit visits_[2];
+  std::array<Visit, 2> visits_;
   ChainFigures figures_;
 };
 
 template <class Splat>
 void RemainderChain::run(std::uint64_t mutations, Rng& rng, const Splat& splat) {
-  Visit* from = &start_;
-  Visit* to = &visits_[0];
-  double gathered = 0;
-  const auto flush = [&] {
-    if (gathered > 0.0) splat(from->share, from->state.contribution.color, gathered);
-    gathered = 0.0;
+  const auto propose = [&](Visit& from, Visit& to) {
+    const double acceptance = this->propose(from, to, rng);
+    if (layers_ != nullptr) small_step_.record(from.state, acceptance, *layers_);
+    return acceptance;
   };
-  for (std::uint64_t i = 0; i < mutations; ++i) {
-    const double acceptance = propose(*from, *to, rng);
-    if (layers_ != nullptr) small_step_.record(from->state, acceptance, *layers_);
-    gathered += 1.0 - acceptance;
-    if (rng.uniform() < acceptance) {
-      flush();
-      Visit* const left = from;
-      from = to;
-      to = left == &start_ ? &visits_[1] : left;
-      gathered = acceptance;
-    } else if (acceptance > 0.0) {
-      splat(to->share, to->state.contribution.color, acceptance);
-    }
-  }
-  flush();
+  figures_.rejections.hastings +=
+      run_mutations(start_, visits_, mutations, rng, propose, [&](const Visit& at, double weight) {
+        splat(at.share, at.state.contribution.color, weight);
+      });
 }
 
 }  // namespace driftlight

@@ -13,19 +13,8 @@ namespace {
 
 /// Traces and evaluates the coordinates of `to` as a path like `from`; counts why it fails.
 bool evaluate(const Scene& scene, const ChainState& from, ChainState& to, Rejections& rejections) {
-  switch (trace(scene, from.topology, to.coordinates, to.topology)) {
-    case TraceStatus::Ok:
-      break;
-    case TraceStatus::Missed:
-      ++rejections.missed;
-      return false;
-    case TraceStatus::OtherLobe:
-      ++rejections.other_lobe;
-      return false;
-    case TraceStatus::Occluded:
-      ++rejections.occluded;
-      return false;
-  }
+  if (!succeeded(trace(scene, from.topology, to.coordinates, to.topology), rejections))
+    return false;
   to.has_step = false;
   to.log_weight = std::numeric_limits<double>::quiet_NaN();
   to.contribution = contribution(scene, to.topology, to.coordinates);
@@ -39,6 +28,23 @@ bool evaluate(const Scene& scene, const ChainState& from, ChainState& to, Reject
 }
 
 }  // namespace
+
+bool succeeded(TraceStatus status, Rejections& rejections) {
+  switch (status) {
+    case TraceStatus::Ok:
+      return true;
+    case TraceStatus::Missed:
+      ++rejections.missed;
+      return false;
+    case TraceStatus::OtherLobe:
+      ++rejections.other_lobe;
+      return false;
+    case TraceStatus::Occluded:
+      ++rejections.occluded;
+      return false;
+  }
+  return false;
+}
 
 double log_acceptance(double log_target_from, double log_target_to, double log_pdf_forward,
                       double log_pdf_reverse) {

@@ -27,6 +27,8 @@ constexpr double kWorth = 20.0;
 /// Least noise to be saved, in units of the squared brightness: that of the samples themselves is
 /// about 1. What is saved must also outweigh the time that splitting takes of the samples.
 constexpr double kLeastSaving = 0.05;
+/// Least deposit of a step at the last level, below which more of them no longer pay.
+constexpr double kLeastDeposit = 0.2;
 /// Most deposit of a particle.
 constexpr double kMostDeposit = 64.0;
 /// Fewest and most samples of the top level for each of the scene.

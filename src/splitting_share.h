@@ -21,9 +21,13 @@ class SplittingShare {
   SplittingShare(const Scene& scene, const LangevinOptions& options, const RenderOptions& render,
                  const Remainder& remainder, BrightnessMap& brightness);
 
+  /// Whether it has anything.
+  bool has_some() const { return plan_.some; }
   /// Whether particles carry what samples leave of such a path.
-  bool takes(const PathTopology& path) const {
-    return levels_.carry(path) && plan_.takes(LobeSequence(path));
+  bool takes(const FoundPath& path) const {
+    if (!plan_.some) return false;
+    const auto state = state_of(levels_[0], path, options_.phase_space);
+    return state && levels_.carry(state->topology) && plan_.takes(LobeSequence(state->topology));
   }
 
   /// Runs samples of the softest level. A copy shares nothing but the share.

@@ -1,47 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "veach_chain.h"
 
-#include <cmath>
-
 namespace driftlight {
-namespace {
-
-/// Of a proposal of this status. What fails is counted.
-double vertex_acceptance(TraceStatus status, const VertexPath& x, const VertexPath& y,
-                         const MutationDensities& densities, Rejections& rejections) {
-  switch (status) {
-    case TraceStatus::Ok:
-      break;
-    case TraceStatus::Missed:
-      ++rejections.missed;
-      return 0.0;
-    case TraceStatus::OtherLobe:
-      ++rejections.other_lobe;
-      return 0.0;
-    case TraceStatus::Occluded:
-      ++rejections.occluded;
-      return 0.0;
-  }
-  const double from = x.contribution().log_target;
-  const double to = y.contribution().log_target;
-  if (!std::isfinite(to) || !std::isfinite(densities.forward) || std::isnan(densities.reverse)) {
-    ++rejections.non_finite;
-    return 0.0;
-  }
-  return std::exp(log_acceptance(from, to, densities.forward, densities.reverse));
-}
-
-}  // namespace
-
-double perturb(const PathMutation& mutation, const VertexPath& x, VertexPath& y, Rng& rng,
-               Rejections& rejections) {
-  MutationDensities densities;
-  const bool caustic = PathMutation::has_caustic(x) && rng.uniform() < 0.5;
-  const TraceStatus status =
-      caustic ? mutation.caustic(x, y, densities, rng) : mutation.from_sensor(x, y, densities, rng);
-  return vertex_acceptance(status, x, y, densities, rejections);
-}
-
 VeachChain::VeachChain(const PathMutation& mutation, double bidirectional_probability, Film& film,
                        const VertexPath& start, Rng rng)
     : mutation_(mutation),
@@ -56,17 +16,20 @@ void VeachChain::run(std::uint64_t mutations) {
     const VertexPath& x = paths_[current_];
     VertexPath& y = paths_[1 - current_];
     ++statistics_.path_length[static_cast<std::size_t>(x.edges)];
-    double acceptance = 0;
     const bool bidirectional = rng_.uniform() < bidirectional_probability_;
-    if (bidirectional) {
-      MutationDensities densities;
-      Rejections elsewhere;  // those of small steps are reported
-      const TraceStatus status = mutation_.bidirectional(x, y, densities, rng_);
-      acceptance = vertex_acceptance(status, x, y, densities, elsewhere);
-      statistics_.rejections.non_finite += elsewhere.non_finite;
-    } else {
-      acceptance = perturb(mutation_, x, y, rng_, statistics_.rejections);
-    }
+    MutationDensities densities;
+    const TraceStatus status = bidirectional ? mutation_.bidirectional(x, y, densities, rng_)
+                                             : mutation_.perturb(x, y, densities, rng_);
+    Rejections rejections;
+    const double acceptance =
+        succeeded(status, rejections)
+            ? acceptance_of(x.contribution().log_target, y.contribution().log_target, densities,
+                            rejections)
+            : 0.0;
+    if (bidirectional)  // of the others those of small steps are reported
+      statistics_.rejections.non_finite += rejections.non_finite;
+    else
+      statistics_.rejections += rejections;
     KernelStatistics& kernel = bidirectional ? statistics_.large_step : statistics_.small_step;
     ++kernel.proposed;
     kernel.accepted += acceptance;

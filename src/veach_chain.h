@@ -12,9 +12,8 @@
 
 namespace driftlight {
 
-/// Which mutation it is does not depend on the path, but that one without a caustic perturbation is
-/// perturbed from the sensor instead; and perturbations keep what this depends on. So each kind is
-/// in detailed balance by itself: y is accepted with probability
+/// Whether a mutation is bidirectional or a perturbation does not depend on the path, so each is in
+/// detailed balance by itself: y is accepted with probability
 ///   min(1, f(y) T(x | y) / (f(x) T(y | x))).
 class VeachChain {
  public:
@@ -39,10 +38,5 @@ class VeachChain {
   double gathered_ = 0;  ///< weight of the current path not yet splatted
   LangevinStatistics statistics_;
 };
-
-/// Proposes one of the perturbations of x, the two equally likely where it has both, and returns
-/// the probability of acceptance; what makes it fail is counted.
-double perturb(const PathMutation& mutation, const VertexPath& x, VertexPath& y, Rng& rng,
-               Rejections& rejections);
 
 }  // namespace driftlight

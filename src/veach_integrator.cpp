@@ -69,7 +69,7 @@ struct VeachChains {
 LangevinResult render_mlt(const Scene& scene, const MltOptions& options,
                           const RenderOptions& render, double mutations_per_pixel) {
   options.validate();
-  require_pinhole(scene, "mlt");
+  require_pinhole(scene, "the integrator 'mlt'");
   tbb::task_arena arena(render.threads > 0 ? render.threads : tbb::task_arena::automatic);
   return arena.execute([&] {
     return run_chains(

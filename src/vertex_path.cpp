@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "vertex_path.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -53,6 +54,35 @@ bool VertexPath::evaluate(const Scene& scene) {
   contribution_ = {log_f + std::log(y), color / y,
                    camera.film_position(directions_[0], camera.origin)};
   return y > 0.0;
+}
+
+double log_density(const VertexPath& path, const EmissionGuide& guide) {
+  const int n = path.edges;
+  if (n == 1) return path.log_from_sensor(1);
+  const Vec3d v = -path.toward_light(n - 1);
+  const Vec3d& p = path.end.at_infinity() ? path(n - 1).surface.at.p : path.end.p;
+  const double log_factor = std::log(guide.factor(path.end.emitter, p, v));
+  // Of x_1 .. x_k by the sensor's walk, then of x_k .. x_n by the light's.
+  std::array<double, kMaxPathLength + 2> from_sensor{};
+  for (int k = 1; k <= n; ++k)
+    from_sensor[static_cast<std::size_t>(k)] =
+        from_sensor[static_cast<std::size_t>(k - 1)] + path.log_from_sensor(k);
+  const double by_hit = from_sensor[static_cast<std::size_t>(n)];
+  std::array<double, kMaxPathLength + 2> strategies{};
+  double largest = by_hit;
+  double from_light = 0.0;
+  for (int joint = n; joint > 0; --joint) {
+    from_light += path.log_from_light(joint) + (joint == n - 1 ? log_factor : 0.0);
+    double& log_q = strategies[static_cast<std::size_t>(joint)];
+    log_q = path.connects(joint) ? from_sensor[static_cast<std::size_t>(joint - 1)] + from_light
+                                 : -std::numeric_limits<double>::infinity();
+    largest = std::max(largest, log_q);
+  }
+  if (!std::isfinite(largest)) return largest;
+  double sum = std::exp(by_hit - largest);
+  for (int joint = 1; joint <= n; ++joint)
+    sum += std::exp(strategies[static_cast<std::size_t>(joint)] - largest);
+  return largest + std::log(sum);
 }
 
 namespace {
@@ -120,10 +150,12 @@ class VertexVisitor : public WalkVisitor<double> {
 
 }  // namespace
 
-void require_pinhole(const Scene& scene, const std::string& integrator) {
+bool is_pinhole(const Camera& camera) { return !camera.is_orthographic() && !camera.has_lens(); }
+
+void require_pinhole(const Scene& scene, const std::string& who) {
   const Camera& camera = scene.camera();
-  if (camera.is_orthographic() || camera.has_lens())
-    throw InputError("the integrator '" + integrator + "' needs a pinhole; this scene's sensor " +
+  if (!is_pinhole(camera))
+    throw InputError(who + " needs a pinhole; this scene's sensor " +
                      (camera.has_lens() ? "has a lens" : "is orthographic"));
 }
 

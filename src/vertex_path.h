@@ -80,8 +80,16 @@ class VertexPath {
   double log_end_ = 0;
 };
 
-/// Throws InputError unless the scene's sensor is a pinhole.
-void require_pinhole(const Scene& scene, const std::string& integrator);
+/// log q, the density with which one bidirectional sample by this guide finds an evaluated path:
+/// q = sum_s prod_(k <= n - s) A_k prod_(k > n - s) B_k over the strategies of s vertices from the
+/// light whose joining edge has a delta vertex at neither end, for s > 1 times the guide's factor.
+/// Emitters that are seen directly are left to s = 0.
+double log_density(const VertexPath& path, const EmissionGuide& guide);
+
+bool is_pinhole(const Camera& camera);
+
+/// Throws InputError unless the scene's sensor is a pinhole; it begins with `who`, which needs one.
+void require_pinhole(const Scene& scene, const std::string& who);
 
 /// The same paths by their vertices, not yet evaluated.
 VertexPath vertex_path(const Scene& scene, const PathSampler::Sample& sample);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "brightness_map.h"
+#include "driftlight/error.h"
 #include "driftlight/render.h"
 #include "found_path.h"
 #include "light_rate.h"
@@ -20,7 +21,7 @@ namespace driftlight::test {
 namespace {
 
 /// The value of each path that bidirectional path tracing finds, against f / q of the same path
-/// with coordinates: by the weights of the balance heuristic they are one.
+/// with coordinates and by its vertices: by the weights of the balance heuristic they are one.
 struct ComparingSink {
   const Scene& scene;
   const Remainder& remainder;
@@ -29,11 +30,14 @@ struct ComparingSink {
   int uncharted = 0;
   int strategies = 0;  ///< bit s of those with a chart
   int different = 0;
+  int by_vertices = 0;
+  int different_by_vertices = 0;
 
   void add(const Rgbd& value, const FoundPath& path) { splat(film, value, path); }
   void splat(const Vec2d& at, const Rgbd& value, const FoundPath& path) {
     const double y = luminance(value) / path.roulette;
     if (!(y > 1e-200)) return;
+    if (is_pinhole(scene.camera())) compare_by_vertices(at, y, path);
     const auto sample = state_of(scene, path);
     if (!sample) {
       ++uncharted;
@@ -45,6 +49,15 @@ struct ComparingSink {
                                         contribution(scene, sample->topology, sample->coordinates));
     EXPECT_NEAR((share.film - at).norm(), 0.0, 1e-6);
     if (std::abs(share.w * share.brightness / y - 1.0) > 1e-5) ++different;
+  }
+
+  void compare_by_vertices(const Vec2d& at, double y, const FoundPath& path) {
+    VertexPath vertices = vertex_path(path);
+    if (!vertices.evaluate(scene)) return;
+    ++by_vertices;
+    const Share share = remainder.share(vertices);
+    EXPECT_NEAR((share.film - at).norm(), 0.0, 1e-6);
+    if (std::abs(share.w * share.brightness / y - 1.0) > 1e-5) ++different_by_vertices;
   }
 };
 
@@ -68,6 +81,10 @@ TEST(FoundPath, ItsValueIsContributionOverDensity) {
     // A ray that only just passes an edge, or many round mirrors, may be traced anew otherwise.
     EXPECT_LT(sink.different, 1e-3 * sink.charted);
     EXPECT_LT(sink.uncharted, 0.3 * sink.charted);
+    EXPECT_LE(sink.different_by_vertices, 1e-3 * sink.by_vertices);
+    if (is_pinhole(test.scene.camera())) {
+      EXPECT_GT(sink.by_vertices, 0.999 * (sink.charted + sink.uncharted));
+    }
   }
 }
 
@@ -128,9 +145,10 @@ TEST(BrightnessMap, AddsLightWithoutItsBrightestPoints) {
 }
 
 LangevinResult render_small(const Scene& scene, int threads, std::optional<double> threshold,
-                            double scale = 0.32) {
+                            std::optional<double> perturbations = 0.0, double scale = 0.32) {
   LangevinOptions options;
   options.kernel.scale = scale;
+  options.redistribution.perturbations = perturbations;
   options.mode = Mode::Redistribution;
   options.max_depth = 6;
   options.redistribution.threshold = threshold;
@@ -142,22 +160,23 @@ LangevinResult render_small(const Scene& scene, int threads, std::optional<doubl
 
 TEST(Redistribution, DoesNotDependOnThreads) {
   const Scene& scene = test_scenes().front().scene;
-  const LangevinResult one = render_small(scene, 1, 0.1);
+  const LangevinResult one = render_small(scene, 1, 0.1, 0.5);
   EXPECT_GT(one.statistics.mutations, 500U);
   for (const int threads : {2, 4}) {
-    const LangevinResult other = render_small(scene, threads, 0.1);
+    const LangevinResult other = render_small(scene, threads, 0.1, 0.5);
     EXPECT_EQ(one.image.rgb, other.image.rgb);
     EXPECT_EQ(one.statistics.mutations, other.statistics.mutations);
     EXPECT_EQ(one.statistics.small_step.accepted, other.statistics.small_step.accepted);
   }
 }
 
-TEST(Redistribution, ChosenThresholdDoesNotDependOnThreads) {
+TEST(Redistribution, PlanDoesNotDependOnThreads) {
   const Scene& scene = test_scenes().front().scene;
-  const LangevinResult one = render_small(scene, 1, std::nullopt);
-  const LangevinResult two = render_small(scene, 2, std::nullopt);
-  EXPECT_GE(one.statistics.threshold, 1.0);
+  const LangevinResult one = render_small(scene, 1, std::nullopt, std::nullopt);
+  const LangevinResult two = render_small(scene, 2, std::nullopt, std::nullopt);
   EXPECT_EQ(one.statistics.threshold, two.statistics.threshold);
+  EXPECT_EQ(one.statistics.perturbations, two.statistics.perturbations);
+  EXPECT_EQ(one.statistics.mutations_per_sample, two.statistics.mutations_per_sample);
   EXPECT_EQ(one.statistics.light_subpaths, two.statistics.light_subpaths);
   EXPECT_EQ(one.image.rgb, two.image.rgb);
 }
@@ -230,9 +249,25 @@ TEST(Redistribution, ChoosesHowManyLightSubpathsPay) {
 TEST(Redistribution, ChoosesAHighThresholdForChainsThatStay) {
   const LoadedScene loaded = load_small("small_hole");
   const LangevinResult moving = render_small(loaded.scene, 2, std::nullopt);
-  const LangevinResult stuck = render_small(loaded.scene, 2, std::nullopt, 1e6);
+  const LangevinResult stuck = render_small(loaded.scene, 2, std::nullopt, 0.0, 1e6);
   EXPECT_GE(stuck.statistics.threshold, 8.0);
   EXPECT_LT(moving.statistics.threshold, stuck.statistics.threshold);
+}
+
+/// Where all light comes through an opening samples are noisy though few are bright, and
+/// perturbations keep to it.
+TEST(Redistribution, PerturbsChainsThroughAnOpening) {
+  const LoadedScene loaded = load_small("small_hole");
+  const LangevinStatistics chosen =
+      render_small(loaded.scene, 2, std::nullopt, std::nullopt).statistics;
+  EXPECT_EQ(chosen.perturbations, 1.0);
+  EXPECT_LT(chosen.threshold, 1.0);
+  EXPECT_GT(chosen.mutations_per_sample, 4.0);
+}
+
+TEST(Redistribution, PerturbationsNeedAPinhole) {
+  EXPECT_THROW(render_small(lens(false), 2, 1.0, 0.5), InputError);
+  EXPECT_EQ(render_small(lens(false), 2, std::nullopt, std::nullopt).statistics.perturbations, 0.0);
 }
 
 /// What no sample exceeds is carried by the samples alone.
@@ -243,11 +278,11 @@ TEST(Redistribution, LeavesNothingAboveAHighThreshold) {
   EXPECT_GT(result.statistics.b, 0.0);
 }
 
-/// An emitter as bright as what is around it has w = 1; where it is seen, tau is 16 times as high.
+/// An emitter as bright as what is around it has w = 1; where it is seen, tau is 16 at least.
 TEST(Redistribution, LeavesWhatIsSeenDirectlyToSamples) {
-  const Scene glow = furnace(0.0);
-  EXPECT_EQ(render_small(glow, 2, 1.0 / 15.0).statistics.mutations, 0U);
-  EXPECT_GT(render_small(glow, 2, 0.001).statistics.mutations, 0U);
+  EXPECT_EQ(render_small(furnace(0.0), 2, 0.001).statistics.mutations, 0U);
+  EXPECT_EQ(Remainder::tau_seen(0.5), 16.0);
+  EXPECT_EQ(Remainder::tau_seen(2.0), 32.0);
 }
 
 }  // namespace

@@ -84,8 +84,11 @@ struct RedistributionOptions {
   std::optional<double> threshold = std::nullopt;
   /// Mutations of a chain.
   int chain_length = 100;
-  /// Most mutations for each bidirectional sample, in the mean.
-  double mutations_per_sample = 4;
+  /// Most mutations for each bidirectional sample, in the mean. None: from a pilot.
+  std::optional<double> mutations_per_sample = std::nullopt;
+  /// Share of the starts whose chains move by the perturbations of Veach and Guibas 1997 and not
+  /// by Langevin steps; 0 unless the sensor is a pinhole. None: from a pilot.
+  std::optional<double> perturbations = std::nullopt;
   /// Light subpaths start where a pilot has found that light comes from.
   bool guide = true;
   /// Samples of the last round of the pilot, of about twice as many in all.

@@ -21,7 +21,7 @@ enum class Stream : std::uint64_t {
   Test,
   GradientCheck,
   SplittingPilot,
-  ThresholdPilot,
+  ChainPilot,
   LightRate
 };
 

@@ -118,8 +118,10 @@ struct LangevinStatistics {
   /// Of Mode::Redistribution: mean luminance that chains carry, and how many samples started any.
   double remainder = 0;
   std::uint64_t starts = 0;
-  double threshold = 0;       ///< tau
-  double light_subpaths = 1;  ///< for each sample, in the mean
+  double threshold = 0;             ///< tau
+  double perturbations = 0;         ///< share of the starts
+  double mutations_per_sample = 0;  ///< most, in the mean
+  double light_subpaths = 1;        ///< for each sample, in the mean
   double samples_per_pixel = 0;
   /// Of Mode::Splitting: from level 0, the scene itself, to the softest; empty if nothing was left
   /// to splitting.

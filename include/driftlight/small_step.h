@@ -27,6 +27,9 @@ struct ChainState {
   double log_weight = std::numeric_limits<double>::quiet_NaN();
 };
 
+/// True for Ok; what made a proposal fail is counted.
+bool succeeded(TraceStatus status, Rejections& rejections);
+
 /// log of the acceptance probability min(1, pi(y) p(x|y) / (pi(x) p(y|x))) (E63.6); -infinity if
 /// anything is NaN.
 double log_acceptance(double log_target_from, double log_target_to, double log_pdf_forward,

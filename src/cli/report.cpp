@@ -114,9 +114,13 @@ void report_redistribution(const std::string& integrator, const LangevinStatisti
                             {"starts", s.starts},
                             {"remainder", s.remainder},
                             {"threshold", s.threshold},
+                            {"perturbations", s.perturbations},
+                            {"mutations_per_sample", s.mutations_per_sample},
                             {"light_subpaths", s.light_subpaths}});
-  report.details.push_back(fmt::format("threshold {:g}, {:g} light subpaths for each sample",
-                                       s.threshold, s.light_subpaths));
+  report.details.push_back(fmt::format(
+      "threshold {:g}, {:g} light subpaths for each sample, at most {:g} mutations, {:g} of the "
+      "chains perturbed",
+      s.threshold, s.light_subpaths, s.mutations_per_sample, s.perturbations));
   report.summary = {
       fmt::format("{}: {} x {} pixels, {:.4g} samples and {:.4g} mutations per pixel in {:.2f} s",
                   integrator, image.width, image.height, s.samples_per_pixel,
