@@ -97,10 +97,15 @@ struct Choices {
     if (options.mutations_per_sample) mutations_per_sample = {*options.mutations_per_sample};
   }
 
-  double least_threshold() const { return thresholds.front(); }
-  bool none() const {
-    return thresholds.size() * perturbations.size() * mutations_per_sample.size() == 1;
+  std::vector<ChainPlan> plans() const {
+    std::vector<ChainPlan> plans;
+    for (const double threshold : thresholds)
+      for (const double share : perturbations)
+        for (const double mutations : mutations_per_sample)
+          plans.push_back({threshold, share, mutations});
+    return plans;
   }
+  double least_threshold() const { return thresholds.front(); }
   bool moves() const { return perturbations.front() < 1.0; }
   bool perturbs() const { return perturbations.back() > 0.0; }
 };
@@ -271,10 +276,8 @@ double cost_of(const std::vector<Sample>& samples, const ChainPlan& plan, double
 ChainPlan plan_chains(const Scene& scene, const LangevinOptions& options, const Pilot& pilot,
                       const SplittingShare& splitting, std::uint64_t seed) {
   const Choices choices(scene, options.redistribution, splitting.has_some());
-  ChainPlan best{.threshold = choices.least_threshold(),
-                 .perturbations = choices.perturbations.front(),
-                 .mutations_per_sample = choices.mutations_per_sample.front()};
-  if (choices.none()) return best;
+  const std::vector<ChainPlan> plans = choices.plans();
+  if (plans.size() == 1) return plans.front();
   const Remainder remainder(scene, pilot.guide, pilot.brightness, choices.least_threshold());
   const auto run = [&](std::uint64_t first, std::uint64_t number, double light) {
     std::vector<Sample> samples(number);
@@ -301,22 +304,18 @@ ChainPlan plan_chains(const Scene& scene, const LangevinOptions& options, const 
   for (const Sample& sample : run(0, first_count, kInfinity))
     for (const std::vector<Bright>* paths : {&sample.own, &sample.splat})
       for (const Bright& bright : *paths) left += bright.left(choices.least_threshold());
-  if (!(left > 0.0)) return best;
+  if (!(left > 0.0))
+    return {options.redistribution.threshold.value_or(1.0), plans.front().perturbations,
+            plans.front().mutations_per_sample};
   const std::vector<Sample> samples =
       run(first_count, count, left / static_cast<double>(first_count) / kStarts);
-  double least = kInfinity;
-  for (const double threshold : choices.thresholds)
-    for (const double perturbations : choices.perturbations)
-      for (const double mutations : choices.mutations_per_sample) {
-        const ChainPlan plan{threshold, perturbations, mutations};
-        const double cost =
-            cost_of(samples, plan, pilot.sample_cost, options.redistribution.chain_length) *
-            (is_usual(plan) ? 1.0 : kDoubt);
-        if (cost >= least) continue;
-        least = cost;
-        best = plan;
-      }
-  return best;
+  std::vector<double> costs(plans.size());
+  tbb::parallel_for(std::size_t{0}, plans.size(), [&](std::size_t i) {
+    costs[i] = cost_of(samples, plans[i], pilot.sample_cost, options.redistribution.chain_length) *
+               (is_usual(plans[i]) ? 1.0 : kDoubt);
+  });
+  return plans[static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) -
+                                        costs.begin())];
 }
 
 }  // namespace driftlight

@@ -306,9 +306,9 @@ TEST_P(CheckedRender, LeavesItsImageAlone) {
 INSTANTIATE_TEST_SUITE_P(Modes, CheckedRender,
                          ::testing::Values(std::vector<std::string>{"--set", "mode=chain",
                                                                     "--mutations-per-pixel", "20"},
-                                           std::vector<std::string>{"--set", "threshold=0.2",
-                                                                    "--set", "chain_length=4",
-                                                                    "--spp", "8"}),
+                                           std::vector<std::string>{
+                                               "--set", "threshold=0.2", "--set", "perturbations=0",
+                                               "--set", "chain_length=4", "--spp", "8"}),
                          [](const auto& instance) {
                            return std::string(instance.index == 0 ? "chain" : "redistribution");
                          });

@@ -156,7 +156,8 @@ void run(const IntegratorsCommand& /*command*/) {
       describe_integrator<LangevinOptions>(
           "langevin",
           "Metropolis-adjusted Langevin sampling of light paths (Ershov, Frolov, Nikolaev and "
-          "Voloboy 2023, doi 10.20948/prepr-2023-63); delayed_rejection after Tierney and Mira "
+          "Voloboy 2023, doi 10.20948/prepr-2023-63); perturbations are those of mlt; "
+          "delayed_rejection after Tierney and Mira "
           "1999, Green and Mira 2001, and Rioux-Lavoie et al. 2020, doi 10.1145/3388538") +
       describe_integrator<PssmltOptions>(
           "pssmlt",

@@ -2,12 +2,16 @@
 #include "mesh_ply.h"
 
 #include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <string_view>
 
 #include "driftlight/error.h"
@@ -50,14 +54,18 @@ class PlyValues {
   void expect(const PlyElement& element) const {
     std::uint64_t row = 0;
     for (const PlyProperty& property : element.properties)
-      row += encoding_ == PlyEncoding::Ascii ? 1
-                                             : size_of(property.count_type.value_or(property.type));
+      row += is_text() ? 1 : size_of(property.count_type.value_or(property.type));
     if (row > 0 && element.count > bytes_.size() / row)
       throw InputError(
           fmt::format("it is truncated: it says that it has {} elements '{}', which is more than "
                       "its size allows",
                       element.count, element.name));
   }
+
+  bool is_text() const { return encoding_ == PlyEncoding::Ascii; }
+  std::size_t size() const { return bytes_.size(); }
+  /// Those that follow after so many bytes.
+  PlyValues after(std::size_t bytes) const { return {bytes_.substr(bytes), encoding_}; }
 
   /// The number of values of a list, which are still to come.
   std::size_t next_count(PlyType type) {
@@ -95,6 +103,16 @@ class PlyValues {
   std::string_view bytes_;
   PlyEncoding encoding_;
 };
+
+/// Bytes of a row in binary, if its lists have so many values.
+std::size_t row_size(const PlyElement& element, std::size_t values_of_list) {
+  std::size_t size = 0;
+  for (const PlyProperty& property : element.properties)
+    size += property.count_type
+                ? size_of(*property.count_type) + values_of_list * size_of(property.type)
+                : size_of(property.type);
+  return size;
+}
 
 /// Where a property of a vertex belongs: x, y, z, nx, ny, nz, u, v, red, green, blue.
 constexpr std::size_t kSlotCount = 11;
@@ -172,21 +190,40 @@ class PlyReader {
     const bool has_normals = has[3] && has[4] && has[5];
     const bool has_uvs = has[6] && has[7];
     const bool has_colors = has[8] && has[9] && has[10];
-    mesh.positions.reserve(element.count);
-    std::array<float, kSlotCount> row{};
-    for (std::uint64_t i = 0; i < element.count; ++i) {
+    mesh.positions.resize(element.count);
+    if (has_normals) mesh.normals.resize(element.count);
+    if (has_uvs) mesh.uvs.resize(element.count);
+    if (has_colors) file_.colors.resize(element.count);
+    const auto read = [&](PlyValues& values, std::uint64_t i) {
+      std::array<float, kSlotCount> row{};
       for (std::size_t k = 0; k < slots.size(); ++k) {
         if (slots[k])
-          row.at(*slots[k]) = static_cast<float>(values_.next(element.properties[k].type));
+          row.at(*slots[k]) = static_cast<float>(values.next(element.properties[k].type));
         else
-          skip(element.properties[k]);
+          skip(element.properties[k], values);
       }
-      mesh.positions.emplace_back(row[0], row[1], row[2]);
-      if (has_normals) mesh.normals.emplace_back(row[3], row[4], row[5]);
-      if (has_uvs) mesh.uvs.emplace_back(row[6], row[7]);
-      if (has_colors)
-        file_.colors.emplace_back(row[8] / unit[8], row[9] / unit[9], row[10] / unit[10]);
-    }
+      mesh.positions[i] = {row[0], row[1], row[2]};
+      if (has_normals) mesh.normals[i] = {row[3], row[4], row[5]};
+      if (has_uvs) mesh.uvs[i] = {row[6], row[7]};
+      if (has_colors) file_.colors[i] = {row[8] / unit[8], row[9] / unit[9], row[10] / unit[10]};
+    };
+    const bool has_lists =
+        std::any_of(element.properties.begin(), element.properties.end(),
+                    [](const PlyProperty& property) { return property.count_type.has_value(); });
+    if (values_.is_text() || has_lists)
+      for (std::uint64_t i = 0; i < element.count; ++i) read(values_, i);
+    else
+      read_rows(element.count, row_size(element, 0), read);
+  }
+
+  /// Rows of one size each, side by side.
+  template <class Read>
+  void read_rows(std::uint64_t count, std::size_t row_size, const Read& read) {
+    tbb::parallel_for(tbb::blocked_range<std::uint64_t>(0, count, kRows), [&](const auto& rows) {
+      PlyValues values = values_.after(rows.begin() * row_size);
+      for (std::uint64_t i = rows.begin(); i < rows.end(); ++i) read(values, i);
+    });
+    values_ = values_.after(count * row_size);
   }
 
   void read_faces(const PlyElement& element) {
@@ -194,31 +231,67 @@ class PlyReader {
       throw InputError("its faces lack the list 'vertex_indices'");
     for (const PlyProperty& property : element.properties)
       if (!is_polygon(property)) file_.unused.push_back("face " + property.name);
+    if (are_triangles(element)) {
+      file_.mesh.triangles.resize(element.count);
+      read_rows(element.count, row_size(element, 3), [&](PlyValues& values, std::uint64_t i) {
+        for (const PlyProperty& property : element.properties) {
+          if (!is_polygon(property)) {
+            skip(property, values);
+            continue;
+          }
+          values.next(*property.count_type);
+          for (std::uint32_t& index : file_.mesh.triangles[i])
+            index = read_index(property.type, values);
+        }
+      });
+      return;
+    }
     file_.mesh.triangles.reserve(element.count);
     for (std::uint64_t i = 0; i < element.count; ++i)
       for (const PlyProperty& property : element.properties) {
         if (is_polygon(property))
           read_polygon(property);
         else
-          skip(property);
+          skip(property, values_);
       }
+  }
+
+  /// Whether the rows to come are binary, each with one list, of three corners.
+  bool are_triangles(const PlyElement& element) const {
+    const std::size_t size = row_size(element, 3);
+    if (values_.is_text() || element.count > values_.size() / size) return false;
+    std::size_t before = 0;
+    const PlyProperty* list = nullptr;
+    for (const PlyProperty& property : element.properties) {
+      if (property.count_type && (list != nullptr || !is_polygon(property))) return false;
+      if (property.count_type) list = &property;
+      if (list == nullptr) before += size_of(property.type);
+    }
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::uint64_t>(0, element.count, kRows), true,
+        [&](const auto& rows, bool all) {
+          for (std::uint64_t i = rows.begin(); all && i < rows.end(); ++i)
+            all = values_.after(i * size + before).next(*list->count_type) == 3.0;
+          return all;
+        },
+        std::logical_and<>());
   }
 
   /// A fan around the first corner.
   void read_polygon(const PlyProperty& property) {
     const std::size_t count = values_.next_count(*property.count_type);
     if (count < 3) throw InputError("a face has fewer than three corners");
-    const std::uint32_t first = read_index(property.type);
-    std::uint32_t last = read_index(property.type);
+    const std::uint32_t first = read_index(property.type, values_);
+    std::uint32_t last = read_index(property.type, values_);
     for (std::size_t i = 2; i < count; ++i) {
-      const std::uint32_t next = read_index(property.type);
+      const std::uint32_t next = read_index(property.type, values_);
       file_.mesh.triangles.push_back({first, last, next});
       last = next;
     }
   }
 
-  std::uint32_t read_index(PlyType type) {
-    const double index = values_.next(type);
+  static std::uint32_t read_index(PlyType type, PlyValues& values) {
+    const double index = values.next(type);
     const auto whole = static_cast<std::uint32_t>(std::clamp(index, 0.0, 4294967295.0));
     if (static_cast<double>(whole) != index)
       throw InputError(fmt::format("a face refers to vertex {}", index));
@@ -228,13 +301,15 @@ class PlyReader {
   void skip(const PlyElement& element) {
     if (element.properties.empty()) return;
     for (std::uint64_t i = 0; i < element.count; ++i)
-      for (const PlyProperty& property : element.properties) skip(property);
+      for (const PlyProperty& property : element.properties) skip(property, values_);
   }
 
-  void skip(const PlyProperty& property) {
-    const std::size_t count = property.count_type ? values_.next_count(*property.count_type) : 1;
-    for (std::size_t i = 0; i < count; ++i) values_.next(property.type);
+  static void skip(const PlyProperty& property, PlyValues& values) {
+    const std::size_t count = property.count_type ? values.next_count(*property.count_type) : 1;
+    for (std::size_t i = 0; i < count; ++i) values.next(property.type);
   }
+
+  static constexpr std::size_t kRows = 4096;  ///< read by one thread at a time, at least
 
   const PlyHeader& header_;
   PlyValues values_;
