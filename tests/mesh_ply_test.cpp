@@ -131,6 +131,34 @@ TEST(PlyFile, ReadsBothByteOrders) {
   }
 }
 
+/// Rows of one size are read side by side; after a quadrangle they no longer are.
+TEST(PlyFile, ReadsManyFacesInTheirOrder) {
+  constexpr int kFaces = 20000;
+  std::string vertices;
+  for (int i = 0; i < kFaces + 3; ++i)
+    for (const float x : {static_cast<float>(i), i % 2 == 0 ? 0.0F : 1.0F, 0.0F})
+      append(vertices, x, false);
+  const auto face = [](std::uint8_t corners, int first) {
+    std::string bytes;
+    append(bytes, corners, false);
+    for (int i = 0; i < corners; ++i) append(bytes, first + i, false);
+    return bytes;
+  };
+  std::string faces;
+  for (int i = 0; i + 1 < kFaces; ++i) faces += face(3, i);
+  const std::string start =
+      header("binary_little_endian", kXyz, kFaces + 3, kIndices, kFaces) + vertices + faces;
+  const TriangleMesh even = load_mesh(start + face(3, kFaces - 1));
+  const TriangleMesh uneven = load_mesh(start + face(4, kFaces - 1));
+  ASSERT_EQ(even.triangles.size(), static_cast<std::size_t>(kFaces));
+  ASSERT_EQ(uneven.triangles.size(), even.triangles.size() + 1);
+  for (std::uint32_t i = 0; i < kFaces; ++i) {
+    ASSERT_EQ(even.positions[i].x(), static_cast<float>(i));
+    ASSERT_EQ(even.triangles[i], (std::array<std::uint32_t, 3>{i, i + 1, i + 2}));
+    ASSERT_EQ(uneven.triangles[i], even.triangles[i]);
+  }
+}
+
 TEST(PlyFile, MirroringTurnsItInsideOutButInMitsuba3) {
   const SceneDirectory directory;
   directory.write("mesh.ply", kSquare);
