@@ -47,7 +47,7 @@ struct Bright {
   double w;
   bool is_seen;        ///< the path of one edge
   bool starts_chains;  ///< else splitting takes what samples leave
-  Spread moved{};      ///< by Langevin steps
+  Spread langevin{};   ///< by Langevin steps
   Spread perturbed{};
 
   double kept(double tau) const { return roulette * std::min(w, own(tau)); }
@@ -106,7 +106,7 @@ struct Choices {
     return plans;
   }
   double least_threshold() const { return thresholds.front(); }
-  bool moves() const { return perturbations.front() < 1.0; }
+  bool steps() const { return perturbations.front() < 1.0; }
   bool perturbs() const { return perturbations.back() > 0.0; }
 };
 
@@ -123,7 +123,7 @@ class Sampler {
         remainder_(remainder),
         splitting_(splitting),
         tracer_(scene, pilot.guide, MisHeuristic::Balance, options.max_depth),
-        moved_(scene, options.kernel, remainder, nullptr),
+        langevin_(scene, options.kernel, remainder, nullptr),
         perturbed_(scene, remainder, options.max_depth),
         light_(light) {}
 
@@ -164,7 +164,7 @@ class Sampler {
 
   /// By Langevin steps or by perturbations, if either is a choice.
   void follow(const Vec2d& film, const FoundPath& path, double chosen, Bright& bright) {
-    const bool both = choices_.moves() && choices_.perturbs();
+    const bool both = choices_.steps() && choices_.perturbs();
     const double probability = both ? 0.5 * chosen : chosen;
     const Spread stays{1.0 / probability, 1.0 / probability, 1.0 / probability};
     if (both ? rng_->uniform() < 0.5 : choices_.perturbs()) {
@@ -172,8 +172,8 @@ class Sampler {
       return;
     }
     const auto start = remainder_.bright_path(path, options_.phase_space);
-    if (start) moved_.start_at(*start);
-    bright.moved = start ? spread(film, probability, moved_) : stays;
+    if (start) langevin_.start_at(*start);
+    bright.langevin = start ? spread(film, probability, langevin_) : stays;
   }
 
   /// Of two chains from the start, which is at this film point.
@@ -202,7 +202,7 @@ class Sampler {
   const Remainder& remainder_;
   const SplittingShare& splitting_;
   BidirectionalTracer tracer_;
-  RemainderChain moved_;
+  RemainderChain langevin_;
   PerturbationChain perturbed_;
   double light_;
   Sample sample_;
@@ -213,12 +213,12 @@ class Sampler {
 /// Of the chains of a start by the plan.
 Spread spread_by(const ChainPlan& plan, const Bright& bright) {
   const double p = plan.perturbations;
-  const auto mix = [p](double moved, double perturbed) {
-    return (1.0 - p) * moved + p * perturbed;
+  const auto mix = [p](double langevin, double perturbed) {
+    return (1.0 - p) * langevin + p * perturbed;
   };
-  return {mix(bright.moved.kappa, bright.perturbed.kappa),
-          mix(bright.moved.overlap, bright.perturbed.overlap),
-          mix(bright.moved.home, bright.perturbed.home)};
+  return {mix(bright.langevin.kappa, bright.perturbed.kappa),
+          mix(bright.langevin.overlap, bright.perturbed.overlap),
+          mix(bright.langevin.home, bright.perturbed.home)};
 }
 
 /// Error times time by the pilot, up to a factor. Each two samples are of one pixel.

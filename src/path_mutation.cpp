@@ -143,27 +143,11 @@ int PathMutation::draw_count(const KeptEnds& kept, int deleted, Rng& rng) const 
   return count;
 }
 
-double PathMutation::log_way(const VertexPath& y, const KeptEnds& kept, int from_sensor) {
-  const int first = kept.sensor;
-  const int last = y.edges - kept.light;
-  const int joint = first + from_sensor;
-  if (joint <= y.edges && !y.connects(joint)) return -std::numeric_limits<double>::infinity();
-  double sum = 0;
-  for (int k = first; k < joint; ++k) sum += y.log_from_sensor(k);
-  for (int k = joint; k <= last; ++k) sum += y.log_from_light(k);
-  return sum;
-}
-
 double PathMutation::log_regrowth(const VertexPath& y, const KeptEnds& kept, int deleted) const {
   const int count = kept.deleted(y.edges);
-  std::array<double, kMaxPathLength + 2> ways{};
-  double largest = -std::numeric_limits<double>::infinity();
-  for (int i = 0; i <= count; ++i)
-    largest = std::max(largest, ways[static_cast<std::size_t>(i)] = log_way(y, kept, i));
-  if (!std::isfinite(largest)) return largest;
-  double sum = 0;
-  for (int i = 0; i <= count; ++i) sum += std::exp(ways[static_cast<std::size_t>(i)] - largest);
-  return largest + std::log(sum * probability(count, kept, deleted) / (count + 1));
+  LogSum ways;
+  for (int i = 0; i <= count; ++i) ways.add(log_way(y, kept, i));
+  return ways.value() + std::log(probability(count, kept, deleted) / (count + 1));
 }
 
 TraceStatus PathMutation::bidirectional(const VertexPath& x, VertexPath& y,

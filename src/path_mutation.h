@@ -97,7 +97,9 @@ class PathMutation {
   TraceStatus regrow(const VertexPath& x, const KeptEnds& kept, int from_sensor, int from_light,
                      VertexPath& y, Rng& rng) const;
   /// log of the product above, of y that is evaluated; -infinity where i cannot make it.
-  static double log_way(const VertexPath& y, const KeptEnds& kept, int from_sensor);
+  static double log_way(const VertexPath& y, const KeptEnds& kept, int from_sensor) {
+    return y.log_product(kept.sensor, kept.sensor + from_sensor, y.edges - kept.light);
+  }
 
  private:
   /// log T(y | x) for given ends, but for the factor p(a, b | n_x).

@@ -156,7 +156,8 @@ class RedistributionSampler {
                          weight * schedule.deposit * share.brightness / common_.unit);
     };
     const bool perturbed = rng.uniform() < common_.plan.perturbations;
-    if (perturbed ? perturb(schedule, path, rng, deposit) : move(schedule, path, rng, deposit))
+    if (perturbed ? spread_by_perturbations(schedule, path, rng, deposit)
+                  : spread_by_steps(schedule, path, rng, deposit))
       return;
     // No state of a chain: as if it never moved.
     Share stays;
@@ -167,8 +168,8 @@ class RedistributionSampler {
 
   /// False if the path is no state of such a chain.
   template <class Deposit>
-  bool perturb(const ChainSchedule& schedule, const FoundPath& path, Rng& rng,
-               const Deposit& deposit) {
+  bool spread_by_perturbations(const ChainSchedule& schedule, const FoundPath& path, Rng& rng,
+                               const Deposit& deposit) {
     if (!perturbations_.start_at(path)) return false;
     for (double i = 0; i < schedule.chains; ++i)
       perturbations_.run(static_cast<std::uint64_t>(schedule.mutations), rng, deposit);
@@ -177,8 +178,8 @@ class RedistributionSampler {
 
   /// The same by Langevin steps.
   template <class Deposit>
-  bool move(const ChainSchedule& schedule, const FoundPath& path, Rng& rng,
-            const Deposit& deposit) {
+  bool spread_by_steps(const ChainSchedule& schedule, const FoundPath& path, Rng& rng,
+                       const Deposit& deposit) {
     const auto start = common_.remainder.bright_path(path, common_.options.phase_space);
     if (!start) return false;
     std::optional<GradientProbe> probe =

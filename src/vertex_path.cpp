@@ -56,33 +56,34 @@ bool VertexPath::evaluate(const Scene& scene) {
   return y > 0.0;
 }
 
+double VertexPath::log_product(int first, int joint, int last) const {
+  if (joint <= edges && !connects(joint)) return -std::numeric_limits<double>::infinity();
+  double sum = 0;
+  for (int k = first; k < joint; ++k) sum += log_from_sensor(k);
+  for (int k = joint; k <= last; ++k) sum += log_from_light(k);
+  return sum;
+}
+
+double LogSum::value() const {
+  const auto end = terms_.begin() + static_cast<std::ptrdiff_t>(count_);
+  if (count_ == 0) return -std::numeric_limits<double>::infinity();
+  const double largest = *std::max_element(terms_.begin(), end);
+  if (!std::isfinite(largest)) return largest;
+  double sum = 0;
+  for (auto term = terms_.begin(); term != end; ++term) sum += std::exp(*term - largest);
+  return largest + std::log(sum);
+}
+
 double log_density(const VertexPath& path, const EmissionGuide& guide) {
   const int n = path.edges;
   if (n == 1) return path.log_from_sensor(1);
   const Vec3d v = -path.toward_light(n - 1);
   const Vec3d& p = path.end.at_infinity() ? path(n - 1).surface.at.p : path.end.p;
   const double log_factor = std::log(guide.factor(path.end.emitter, p, v));
-  // Of x_1 .. x_k by the sensor's walk, then of x_k .. x_n by the light's.
-  std::array<double, kMaxPathLength + 2> from_sensor{};
-  for (int k = 1; k <= n; ++k)
-    from_sensor[static_cast<std::size_t>(k)] =
-        from_sensor[static_cast<std::size_t>(k - 1)] + path.log_from_sensor(k);
-  const double by_hit = from_sensor[static_cast<std::size_t>(n)];
-  std::array<double, kMaxPathLength + 2> strategies{};
-  double largest = by_hit;
-  double from_light = 0.0;
-  for (int joint = n; joint > 0; --joint) {
-    from_light += path.log_from_light(joint) + (joint == n - 1 ? log_factor : 0.0);
-    double& log_q = strategies[static_cast<std::size_t>(joint)];
-    log_q = path.connects(joint) ? from_sensor[static_cast<std::size_t>(joint - 1)] + from_light
-                                 : -std::numeric_limits<double>::infinity();
-    largest = std::max(largest, log_q);
-  }
-  if (!std::isfinite(largest)) return largest;
-  double sum = std::exp(by_hit - largest);
-  for (int joint = 1; joint <= n; ++joint)
-    sum += std::exp(strategies[static_cast<std::size_t>(joint)] - largest);
-  return largest + std::log(sum);
+  LogSum q;
+  for (int s = 0; s <= n; ++s)
+    q.add(path.log_product(1, n + 1 - s, n) + (s > 1 ? log_factor : 0.0));
+  return q.value();
 }
 
 namespace {

@@ -22,6 +22,18 @@
 
 namespace driftlight {
 
+/// log of a sum of at most kMaxPathLength + 2 terms, given by their logs.
+class LogSum {
+ public:
+  void add(double log_term) { terms_[count_++] = log_term; }
+  /// -infinity of none.
+  double value() const;
+
+ private:
+  std::array<double, kMaxPathLength + 2> terms_{};
+  std::size_t count_ = 0;
+};
+
 class VertexPath {
  public:
   /// x_k, 0 < k < n. Its directions are those to its neighbours, not `surface.wi`.
@@ -61,6 +73,10 @@ class VertexPath {
   double log_spread(int k) const { return at(backward_, k) - at(forward_, k); }
   /// log W(v_0)
   double log_importance() const { return at(forward_, 0); }
+  /// log of prod_(first <= k < joint) A_k prod_(joint <= k <= last) B_k: the vertices before the
+  /// joint are made from the sensor, the others from the light; with joint = n + 1 all from the
+  /// sensor. -infinity where the joining edge cannot be a connection.
+  double log_product(int first, int joint, int last) const;
   /// Whether an edge from x_(k-1) to x_k may be a connection.
   bool connects(int k) const {
     return (k == 1 || !(*this)(k - 1).delta) && (k == edges || !(*this)(k).delta) && edges > 1;

@@ -21,6 +21,16 @@
 namespace driftlight {
 namespace {
 
+/// Bytes of a row in binary, if its lists have so many values.
+std::size_t row_size(const PlyElement& element, std::size_t values_of_list) {
+  std::size_t size = 0;
+  for (const PlyProperty& property : element.properties)
+    size += property.count_type
+                ? size_of(*property.count_type) + values_of_list * size_of(property.type)
+                : size_of(property.type);
+  return size;
+}
+
 /// The values that follow the header, one by one.
 class PlyValues {
  public:
@@ -52,9 +62,7 @@ class PlyValues {
   /// Throws InputError unless there can be `count` rows of so many bytes (binary) or values (text)
   /// each. It bounds what a corrupt header can make us allocate.
   void expect(const PlyElement& element) const {
-    std::uint64_t row = 0;
-    for (const PlyProperty& property : element.properties)
-      row += is_text() ? 1 : size_of(property.count_type.value_or(property.type));
+    const std::size_t row = is_text() ? element.properties.size() : row_size(element, 0);
     if (row > 0 && element.count > bytes_.size() / row)
       throw InputError(
           fmt::format("it is truncated: it says that it has {} elements '{}', which is more than "
@@ -103,16 +111,6 @@ class PlyValues {
   std::string_view bytes_;
   PlyEncoding encoding_;
 };
-
-/// Bytes of a row in binary, if its lists have so many values.
-std::size_t row_size(const PlyElement& element, std::size_t values_of_list) {
-  std::size_t size = 0;
-  for (const PlyProperty& property : element.properties)
-    size += property.count_type
-                ? size_of(*property.count_type) + values_of_list * size_of(property.type)
-                : size_of(property.type);
-  return size;
-}
 
 /// Where a property of a vertex belongs: x, y, z, nx, ny, nz, u, v, red, green, blue.
 constexpr std::size_t kSlotCount = 11;
