@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "driftlight/options.h"
 #include "strategy_weights.h"
 
 namespace driftlight {
@@ -22,8 +23,10 @@ struct FoundPath {
   const Subpath& from_sensor;  ///< x_1 .. x_(t-1) and more
   const Subpath& from_light;   ///< x_(n-1) .. x_t and more, for s > 1
   const LightEnd& end;         ///< x_n
-  /// The inverse of the probability with which roulette has spared it; a factor of its value.
-  double roulette;
+  /// Its value is factor f / q, q the density summed over all strategies: the inverse of the
+  /// probability with which roulette has spared it, and its weight over that of the balance
+  /// heuristic.
+  double factor;
 };
 
 /// Where a sample's random numbers come from: for its subpath from the sensor, with the point on
@@ -45,8 +48,9 @@ class BidirectionalTracer {
                       int max_depth, Roulette roulette = Roulette::On)
       : scene_(scene),
         guide_(guide),
-        tracer_(scene, guide, heuristic, roulette),
-        weights_(guide, heuristic),
+        heuristic_(heuristic),
+        tracer_(scene, guide, roulette),
+        weights_(guide),
         max_depth_(max_depth) {
     for (std::uint32_t i = 0; i < scene.emitters().size(); ++i)
       if (scene.is_blurred(i)) blurred_.push_back(i);
@@ -133,8 +137,8 @@ class BidirectionalTracer {
     const auto end = light_end_at(scene_, z.surface);
     if (!end) return;
     const Vec3d& v = z.surface.wi;
-    const double w = weights_.hit(z, t, *end, end->p, v, end->n.dot(v));
-    sink.add(w * z.throughput * end->emitted, path(0, t, *end, z.roulette));
+    const OfHeuristics w = weights_.hit(z, t, *end, end->p, v, end->n.dot(v));
+    sink.add(chosen(w) * z.throughput * end->emitted, path(0, t, *end, z.roulette * factor(w)));
   }
 
   /// Blurred lamps on the way to a vertex, none of which another strategy finds. What the sensor
@@ -171,9 +175,10 @@ class BidirectionalTracer {
     const auto end = light_end_toward(scene_, escape.direction);
     if (!end) return;
     const int t = from_sensor_.size() + 2;
-    const double w =
+    const OfHeuristics w =
         weights_.hit(tracer_.arrive_at_infinity(escape), t, *end, escape.p, -escape.direction, 1.0);
-    sink.add(w * escape.throughput * end->emitted, path(0, t, *end, escape.roulette));
+    sink.add(chosen(w) * escape.throughput * end->emitted,
+             path(0, t, *end, escape.roulette * factor(w)));
   }
 
   /// s = 1: f_s |n_s . wo| L cos / (p(y) r^2), with a spot's falloff
@@ -186,8 +191,9 @@ class BidirectionalTracer {
     const Rgbd f = scattered(x, x.wi, edge.direction);
     if (!(f.maxCoeff() > 0.0) || !reaches(scene_, end, x, edge)) return;
     const double geometry = edge.falloff * edge.cosine * edge.inverse_r2 / end.density;
-    const double w = weights_.emitter(z, end, edge);
-    sink.add(w * geometry * z.throughput * f * end.emitted, path(1, t, end, z.roulette));
+    const OfHeuristics w = weights_.emitter(z, end, edge);
+    sink.add(chosen(w) * geometry * z.throughput * f * end.emitted,
+             path(1, t, end, z.roulette * factor(w)));
   }
 
   /// s > 1, t > 1: f_z f_y |n_g . wi| / (r^2 |n_g . wo|), the cosines those at y, as in
@@ -206,26 +212,31 @@ class BidirectionalTracer {
     if (scene_.occluded(scene_.leave(a.at.p, a.at.n_g, v), scene_.leave(b.at.p, b.at.n_g, back)))
       return;
     const double geometry = std::abs(b.at.n_g.dot(v) / b.at.n_g.dot(b.wi)) * inverse_r2;
-    const double w = weights_.connection(z, y, v, inverse_r2);
-    sink.add(w * geometry * z.throughput * f * y.throughput,
-             path(s, t, emission_.end, z.roulette * y.roulette));
+    const OfHeuristics w = weights_.connection(z, y, v, inverse_r2);
+    sink.add(chosen(w) * geometry * z.throughput * f * y.throughput,
+             path(s, t, emission_.end, z.roulette * y.roulette * factor(w)));
   }
 
   /// t = 1
   template <class Sink>
   void connect_to_sensor(const SubpathVertex& y, int s, Sink& sink) const {
     const auto seen = driftlight::connect_to_sensor(scene_, y, lens_);
-    if (seen)
-      sink.splat(seen->film, weights_.sensor(y, *seen) * seen->value,
-                 path(s, 1, emission_.end, y.roulette));
+    if (!seen) return;
+    const OfHeuristics w = weights_.sensor(y, *seen);
+    sink.splat(seen->film, chosen(w) * seen->value,
+               path(s, 1, emission_.end, y.roulette * factor(w)));
   }
 
-  FoundPath path(int s, int t, const LightEnd& end, double roulette) const {
-    return {s, t, lens_, v_, from_sensor_, from_light_, end, roulette};
+  double chosen(const OfHeuristics& w) const { return w[static_cast<Eigen::Index>(heuristic_)]; }
+  /// Over that of the balance heuristic.
+  double factor(const OfHeuristics& w) const { return w[0] > 0.0 ? chosen(w) / w[0] : 1.0; }
+  FoundPath path(int s, int t, const LightEnd& end, double factor) const {
+    return {s, t, lens_, v_, from_sensor_, from_light_, end, factor};
   }
 
   const Scene& scene_;
   const EmissionGuide& guide_;
+  MisHeuristic heuristic_;
   SubpathTracer tracer_;
   StrategyWeights weights_;
   int max_depth_;

@@ -43,16 +43,16 @@ struct Spread {
 
 /// A path that is brighter than the least threshold.
 struct Bright {
-  double roulette;
+  double factor;
   double w;
   bool is_seen;        ///< the path of one edge
   bool starts_chains;  ///< else splitting takes what samples leave
   Spread langevin{};   ///< by Langevin steps
   Spread perturbed{};
 
-  double kept(double tau) const { return roulette * std::min(w, own(tau)); }
+  double kept(double tau) const { return factor * std::min(w, own(tau)); }
   double left(double tau) const {
-    return starts_chains ? roulette * std::max(0.0, w - own(tau)) : 0.0;
+    return starts_chains ? factor * std::max(0.0, w - own(tau)) : 0.0;
   }
 
  private:
@@ -122,7 +122,7 @@ class Sampler {
         camera_(scene.camera()),
         remainder_(remainder),
         splitting_(splitting),
-        tracer_(scene, pilot.guide, MisHeuristic::Balance, options.max_depth),
+        tracer_(scene, pilot.guide, MisHeuristic::Power, options.max_depth),
         langevin_(scene, options.kernel, remainder, nullptr),
         perturbed_(scene, remainder, options.max_depth),
         light_(light) {}
@@ -141,19 +141,19 @@ class Sampler {
     if (remainder_.left(w, path) > 0.0)
       sample_.own.push_back(bright(film_, w, path));
     else if (std::isfinite(w))
-      sample_.dim += path.roulette * w;
+      sample_.dim += path.factor * w;
   }
   void splat(const Vec2d& film, const Rgbd& value, const FoundPath& path) {
     const double w = remainder_.weight(film, value, path);
     if (remainder_.left(w, path) > 0.0)
       sample_.splat.push_back(bright(film, w, path));
     else if (std::isfinite(w))
-      sample_.splats2 += sqr(path.roulette * w);
+      sample_.splats2 += sqr(path.factor * w);
   }
 
  private:
   Bright bright(const Vec2d& film, double w, const FoundPath& path) {
-    Bright bright{.roulette = path.roulette,
+    Bright bright{.factor = path.factor,
                   .w = w,
                   .is_seen = path.s + path.t == 2,
                   .starts_chains = !splitting_.takes(path)};

@@ -13,12 +13,8 @@ namespace {
 
 class LightTracer {
  public:
-  /// There are no weights: the heuristic does not matter.
   LightTracer(const Scene& scene, const EmissionGuide& unguided, int max_depth)
-      : scene_(scene),
-        unguided_(unguided),
-        tracer_(scene, unguided, MisHeuristic::Balance),
-        max_depth_(max_depth) {}
+      : scene_(scene), unguided_(unguided), tracer_(scene, unguided), max_depth_(max_depth) {}
 
   void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& sink) {
     const Vec3d lens = sample_lens(scene_.camera(), rng);

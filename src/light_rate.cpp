@@ -123,7 +123,7 @@ Judged run_task(const Scene& scene, const Pilot& pilot, int max_depth, std::uint
   Judged judged;
   for (std::size_t k = 0; k < kRates.size(); ++k) {
     const EmissionGuide guide = pilot.guide.at_rate(kRates[k]);
-    BidirectionalTracer tracer(scene, guide, MisHeuristic::Balance, max_depth);
+    BidirectionalTracer tracer(scene, guide, MisHeuristic::Power, max_depth);
     for (std::uint64_t i = first; i < first + kTask; ++i) {
       Rng rng(seed, Stream::LightRate, i);
       const Vec2d film = rng.uniform2();

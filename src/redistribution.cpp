@@ -99,7 +99,7 @@ class RedistributionSampler {
  public:
   explicit RedistributionSampler(Redistribution& common)
       : common_(common),
-        tracer_(common.scene, common.pilot.guide, MisHeuristic::Balance, common.options.max_depth),
+        tracer_(common.scene, common.pilot.guide, MisHeuristic::Power, common.options.max_depth),
         chain_(common.scene, common.options.kernel, common.remainder, common.layers),
         perturbations_(common.scene, common.remainder, common.options.max_depth),
         splitting_(common.splitting) {}
@@ -142,7 +142,7 @@ class RedistributionSampler {
       left_ += left;
       spread(film, value, left, path, rng);
     }
-    return 1.0 - left / (path.roulette * w);
+    return 1.0 - left / (path.factor * w);
   }
 
   /// By chains of mutations that deposit epsilon each.

@@ -15,7 +15,7 @@ constexpr double kMostW = 1e9;
 
 double Remainder::left(double weight, const FoundPath& path) const {
   const double tau = this->tau(path.s + path.t - 1);
-  return weight > tau && weight < kMostW ? path.roulette * (weight - tau) : 0.0;
+  return weight > tau && weight < kMostW ? path.factor * (weight - tau) : 0.0;
 }
 
 std::optional<BrightPath> Remainder::bright_path(const FoundPath& path,

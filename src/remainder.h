@@ -4,9 +4,14 @@
 /// With q = sum_s q_s the density of the paths that one bidirectional sample finds, m the guess of
 /// the brightness at a path's film point and w = f / (q m),
 ///   f = m q min(w, tau) + m q (w - tau)_+.
-/// Samples carry the first part; their weights are bounded by tau in units of m. The chains target
-/// the remainder over m, pi = q (w - tau)_+, and deposit m times what they visit. Any m > 0 is
-/// right; this one spreads the work, and the noise, over the image in proportion to its brightness.
+/// Strategy s of n finds the path with the value c_s f / q, c_s = w_s q / q_s with weights w_s that
+/// add up to 1, so that sum_s q_s c_s = q: c_s min(w, tau) m is what the sample puts on the film,
+/// and c_s (w - tau)_+ starts chains, right in the mean by any weights. Those of the power
+/// heuristic have less noise than those of the balance heuristic, by which c_s = 1, where few
+/// strategies find most, hardly more elsewhere, and c_s is at most (1 + sqrt n) / 2. Samples carry
+/// the first part; their values are bounded by c_s tau in units of m. The chains target the
+/// remainder over m, pi = q (w - tau)_+, and deposit m times what they visit. Any m > 0 is right;
+/// this one spreads the work, and the noise, over the image in proportion to its brightness.
 ///
 /// Emitters that are seen directly have a higher tau. Samples find a large one with the same weight
 /// all over, and to spread that would only add noise. The edge of a tiny one, far brighter than
@@ -61,11 +66,11 @@ class Remainder {
   double tau(int edges) const { return edges > 1 ? tau_ : tau_seen(tau_); }
   /// Of paths of one edge, where that of others is tau.
   static double tau_seen(double tau) { return 16.0 * std::max(1.0, tau); }
-  /// w of what a sample has found at the film point, `value` with balance weights.
+  /// w of what a sample has found at the film point.
   double weight(const Vec2d& film, const Rgbd& value, const FoundPath& path) const {
-    return luminance(value) / (path.roulette * brightness_(film));
+    return luminance(value) / (path.factor * brightness_(film));
   }
-  /// What samples leave of a path of that weight, times its roulette: 0 where they carry it whole,
+  /// What samples leave of a path of that weight, times its factor: 0 where they carry it whole,
   /// as they do what is so bright that sums might overflow.
   double left(double weight, const FoundPath& path) const;
   /// The path with coordinates of the phase space; none if it has none there, or if by rounding

@@ -16,28 +16,28 @@ double cosine_at(const SurfaceHit& x, const Vec3d& v) { return std::abs(x.at.n_g
 }  // namespace
 
 /// The light's walk makes the end by emitter sampling, and the vertex before it by emission.
-double StrategyWeights::hit(const Arrival& z, int t, const LightEnd& end, const Vec3d& p,
-                            const Vec3d& v, double cosine) const {
-  if (t == 2) return 1.0;
+OfHeuristics StrategyWeights::hit(const Arrival& z, int t, const LightEnd& end, const Vec3d& p,
+                                  const Vec3d& v, double cosine) const {
+  if (t == 2) return OfHeuristics::Ones();
   return 1.0 / (1.0 + others(z, end.density, guide_.density(end, p, v, cosine, 1.0)));
 }
 
-double StrategyWeights::emitter(const SubpathVertex& z, const LightEnd& end,
-                                const LightEdge& edge) const {
+OfHeuristics StrategyWeights::emitter(const SubpathVertex& z, const LightEnd& end,
+                                      const LightEdge& edge) const {
   const SurfaceHit& x = z.surface;
   const Vec3d& wo = edge.direction;
   const Vec3d& p = end.at_infinity() ? x.at.p : end.p;
   const double to_z = guide_.density(end, p, -wo, edge.cosine, edge.falloff) * cosine_at(x, wo);
-  double sum = others(z, to_z * edge.inverse_r2, direction_density(x, wo, x.wi));
+  OfHeuristics sum = others(z, to_z * edge.inverse_r2, direction_density(x, wo, x.wi));
   if (end.can_be_hit()) {
     const double to_end = direction_density(x, x.wi, wo) * edge.cosine * edge.inverse_r2;
-    sum += power_(to_end / end.density);
+    sum += powers(to_end / end.density);
   }
   return 1.0 / (1.0 + sum);
 }
 
-double StrategyWeights::connection(const SubpathVertex& z, const SubpathVertex& y, const Vec3d& v,
-                                   double inverse_r2) const {
+OfHeuristics StrategyWeights::connection(const SubpathVertex& z, const SubpathVertex& y,
+                                         const Vec3d& v, double inverse_r2) const {
   const SurfaceHit& a = z.surface;
   const SurfaceHit& b = y.surface;
   const Vec3d back = -v;
@@ -47,7 +47,7 @@ double StrategyWeights::connection(const SubpathVertex& z, const SubpathVertex& 
                 others(y, to_y, direction_density(b, back, b.wi)));
 }
 
-double StrategyWeights::sensor(const SubpathVertex& y, const SensorConnection& seen) const {
+OfHeuristics StrategyWeights::sensor(const SubpathVertex& y, const SensorConnection& seen) const {
   const SurfaceHit& x = y.surface;
   return 1.0 / (1.0 + others(y, seen.density, direction_density(x, seen.wi, x.wi)));
 }

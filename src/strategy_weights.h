@@ -7,36 +7,34 @@
 
 namespace driftlight {
 
-/// The weights of all strategies that can make a path add up to 1, at each path. Vertices z are of
-/// the subpath from the sensor, y of that from the light.
+/// The weights of all strategies that can make a path add up to 1, at each path, by either
+/// heuristic. Vertices z are of the subpath from the sensor, y of that from the light.
 class StrategyWeights {
  public:
   /// Light subpaths are those of the guide, which must outlive it.
-  StrategyWeights(const EmissionGuide& guide, MisHeuristic heuristic)
-      : guide_(guide), power_(heuristic) {}
+  explicit StrategyWeights(const EmissionGuide& guide) : guide_(guide) {}
 
   /// (0, t): the subpath arrives at the light end along -v, from p if that is at infinity, under
   /// this cosine with its normal (1 at infinity). 1 for t = 2: emitters that are seen directly are
   /// left to camera rays, which have no noise there but that of edges.
-  double hit(const Arrival& z, int t, const LightEnd& end, const Vec3d& p, const Vec3d& v,
-             double cosine) const;
+  OfHeuristics hit(const Arrival& z, int t, const LightEnd& end, const Vec3d& p, const Vec3d& v,
+                   double cosine) const;
   /// (1, t): z connects to a light end drawn by sample_light_end.
-  double emitter(const SubpathVertex& z, const LightEnd& end, const LightEdge& edge) const;
+  OfHeuristics emitter(const SubpathVertex& z, const LightEnd& end, const LightEdge& edge) const;
   /// (s, t) with s, t > 1: v from z to y is of unit length.
-  double connection(const SubpathVertex& z, const SubpathVertex& y, const Vec3d& v,
-                    double inverse_r2) const;
+  OfHeuristics connection(const SubpathVertex& z, const SubpathVertex& y, const Vec3d& v,
+                          double inverse_r2) const;
   /// (s, 1): y is seen by the sensor.
-  double sensor(const SubpathVertex& y, const SensorConnection& seen) const;
+  OfHeuristics sensor(const SubpathVertex& y, const SensorConnection& seen) const;
 
  private:
   /// S_k of the last vertex of a subpath, for `from_beyond` = d_k and `backward` = q_k.
-  double others(const Arrival& x, double from_beyond, double backward) const {
-    return power_(from_beyond / x.density) *
-           (power_(backward) * x.others + (x.previous_connects ? 1.0 : 0.0));
+  static OfHeuristics others(const Arrival& x, double from_beyond, double backward) {
+    return powers(from_beyond / x.density) *
+           (powers(backward) * x.others + (x.previous_connects ? 1.0 : 0.0));
   }
 
   const EmissionGuide& guide_;
-  MisPower power_;
 };
 
 }  // namespace driftlight

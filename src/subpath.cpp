@@ -56,7 +56,6 @@ Departure SubpathTracer::leave_sensor(const Vec3d& v, const Vec3d& lens) const {
     from.density /= camera.spread(v, ray.origin, lens);
   }
   from.throughput = Rgbd::Ones();
-  from.others = 0.0;
   from.connects = true;
   return from;
 }
@@ -72,7 +71,7 @@ Departure SubpathTracer::leave_light(const Emission& emission) const {
   from.density = guide_.density(emission);
   from.throughput =
       end.emitted * (emission.falloff * emission.cosine / (end.density * from.density));
-  from.others = end.can_be_hit() ? 1.0 / power_(end.density) : 0.0;
+  if (end.can_be_hit()) from.others = 1.0 / powers(end.density);
   from.connects = true;
   return from;
 }
@@ -82,7 +81,7 @@ SubpathVertex SubpathTracer::arrive(const Departure& from, const SurfaceHit& sur
   x.surface = surface;
   const double inverse_r2 = from.parallel ? 1.0 : 1.0 / (surface.at.p - from.p).squaredNorm();
   x.density = from.density * std::abs(surface.at.n_g.dot(surface.wi)) * inverse_r2;
-  x.others = power_(from.cosine * inverse_r2) * from.others;
+  x.others = powers(from.cosine * inverse_r2) * from.others;
   x.previous_connects = from.connects;
   x.throughput = from.throughput;
   x.roulette = from.roulette;
@@ -91,7 +90,7 @@ SubpathVertex SubpathTracer::arrive(const Departure& from, const SurfaceHit& sur
 }
 
 Arrival SubpathTracer::arrive_at_infinity(const Departure& from) const {
-  return {from.density, power_(from.cosine) * from.others, from.connects};
+  return {from.density, powers(from.cosine) * from.others, from.connects};
 }
 
 /// Factors of the throughput, in the measure of path tracing (solid angle about each vertex, toward
@@ -120,7 +119,7 @@ Departure SubpathTracer::depart(Walk walk, const SubpathVertex& x, const BsdfSam
   from.throughput = x.throughput * e.f * factor;
   from.roulette = x.roulette;
   const double connection = x.previous_connects && !next.delta ? 1.0 : 0.0;
-  from.others = (power_(backward) * x.others + connection) / power_(x.density);
+  from.others = (powers(backward) * x.others + connection) / powers(x.density);
   from.connects = !next.delta;
   return from;
 }

@@ -13,9 +13,9 @@
 ///   J = d omega_o / d omega_i = n_i^2 |n_s . wi| / (n_o^2 |n_s . wo|)
 /// with n the refractive indices on the two sides: n^2 |cos| d omega is conserved (etendue).
 ///
-/// Weights (Veach 1997, 9.2 and 10.2), with b = 1 for the balance and 2 for the power heuristic.
-/// On its own side a strategy that ends in x_k knows those that leave x_k, or x_k and x_(k-1), ..
-/// to the other side; their densities over its own, to the b, add up to
+/// Weights (Veach 1997, 9.2 and 10.2), with b = 1 for the balance and 2 for the power heuristic;
+/// both are found together. On its own side a strategy that ends in x_k knows those that leave x_k,
+/// or x_k and x_(k-1), .. to the other side; their densities over its own, to the b, add up to
 ///   S_k = (d_k / p_k)^b (S_(k-1) + c_k),
 /// p_k the density of x_k by this walk, d_k that by the other one, and c_k = 1 if the edge from
 /// x_(k-1) to x_k can be a connection, else 0. The weight of the strategy is 1 / (1 + S + S') with
@@ -29,7 +29,6 @@
 #include <array>
 #include <optional>
 
-#include "driftlight/options.h"
 #include "emission_guide.h"
 
 namespace driftlight {
@@ -37,10 +36,15 @@ namespace driftlight {
 /// Which end of the path a subpath starts from.
 enum class Walk : std::uint8_t { FromSensor, FromLight };
 
+/// What there is of both heuristics: of the balance heuristic first, then of the power heuristic.
+using OfHeuristics = Eigen::Array2d;
+/// x^b
+inline OfHeuristics powers(double x) { return {x, x * x}; }
+
 /// What the weights know of a vertex that a walk has come to.
 struct Arrival {
   double density = 0;              ///< p_k per area; at infinity per solid angle
-  double others = 0;               ///< see above
+  OfHeuristics others{0, 0};       ///< see above
   bool previous_connects = false;  ///< x_(k-1) has not scattered by a delta lobe
 };
 
@@ -65,8 +69,8 @@ struct Departure {
   double cosine = 1;   ///< |n_g . omega| there; 1 at the sensor, at points and at infinity
   double density = 0;  ///< of the ray, per solid angle; of parallel ones per area across them
   Rgbd throughput{0, 0, 0};
-  double roulette = 1;  ///< as of a vertex
-  double others = 0;    ///< of the next vertex, without its g^b
+  double roulette = 1;        ///< as of a vertex
+  OfHeuristics others{0, 0};  ///< of the next vertex, without its g^b
   bool connects = false;
 };
 
@@ -85,25 +89,14 @@ class Subpath {
   int size_ = 0;
 };
 
-/// x^b
-class MisPower {
- public:
-  explicit MisPower(MisHeuristic heuristic) : square_(heuristic == MisHeuristic::Power) {}
-  double operator()(double x) const { return square_ ? x * x : x; }
-
- private:
-  bool square_;
-};
-
 /// Whether dim subpaths end early, at random.
 enum class Roulette { Off, On };
 
 class SubpathTracer {
  public:
   /// Walks from the light begin as the guide says, which must outlive it.
-  SubpathTracer(const Scene& scene, const EmissionGuide& guide, MisHeuristic heuristic,
-                Roulette roulette = Roulette::On)
-      : scene_(scene), guide_(guide), power_(heuristic), roulette_(roulette) {}
+  SubpathTracer(const Scene& scene, const EmissionGuide& guide, Roulette roulette = Roulette::On)
+      : scene_(scene), guide_(guide), roulette_(roulette) {}
 
   /// Leaves the sensor at this point of its lens, by the ray of the coordinate v. Its throughput
   /// makes the path an estimate of the radiance there.
@@ -125,7 +118,6 @@ class SubpathTracer {
  private:
   const Scene& scene_;
   const EmissionGuide& guide_;
-  MisPower power_;
   Roulette roulette_;
 };
 

@@ -117,7 +117,7 @@ struct FoundSink {
     VertexPath path = vertex_path(found);
     ASSERT_TRUE(path.evaluate(scene)) << sequence(path);
     const double balanced = path.contribution().log_target - log_all_strategies(path);
-    EXPECT_NEAR(std::log(luminance(value) / found.roulette), balanced, 1e-5)
+    EXPECT_NEAR(std::log(luminance(value) / found.factor), balanced, 1e-5)
         << sequence(path) << " s = " << found.s;
     ++compared;
   }

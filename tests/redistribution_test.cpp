@@ -21,7 +21,7 @@ namespace driftlight::test {
 namespace {
 
 /// The value of each path that bidirectional path tracing finds, against f / q of the same path
-/// with coordinates and by its vertices: by the weights of the balance heuristic they are one.
+/// with coordinates and by its vertices: but for the path's factor they are one.
 struct ComparingSink {
   const Scene& scene;
   const Remainder& remainder;
@@ -35,7 +35,7 @@ struct ComparingSink {
 
   void add(const Rgbd& value, const FoundPath& path) { splat(film, value, path); }
   void splat(const Vec2d& at, const Rgbd& value, const FoundPath& path) {
-    const double y = luminance(value) / path.roulette;
+    const double y = luminance(value) / path.factor;
     if (!(y > 1e-200)) return;
     if (is_pinhole(scene.camera())) compare_by_vertices(at, y, path);
     const auto sample = state_of(scene, path);
@@ -68,12 +68,13 @@ TEST(FoundPath, ItsValueIsContributionOverDensity) {
     // Guided and at a low rate, so that no density is as it was.
     const EmissionGuide guide = learned_guide(test).at_rate(0.5);
     const Remainder remainder(test.scene, guide, flat, 1.0);
-    BidirectionalTracer tracer(test.scene, guide, MisHeuristic::Balance, test.max_depth);
+    BidirectionalTracer by_balance(test.scene, guide, MisHeuristic::Balance, test.max_depth);
+    BidirectionalTracer by_power(test.scene, guide, MisHeuristic::Power, test.max_depth);
     ComparingSink sink{test.scene, remainder, {}};
     for (std::uint64_t i = 0; i < 4000; ++i) {
       Rng rng(1, Stream::Test, i);
       sink.film = rng.uniform2();
-      tracer.sample(sink.film, rng, sink);
+      (i % 2 == 0 ? by_balance : by_power).sample(sink.film, rng, sink);
     }
     EXPECT_GT(sink.charted, 1000);
     const bool hits = test.name != "stage";  // its emitters cannot be hit
@@ -145,9 +146,11 @@ TEST(BrightnessMap, AddsLightWithoutItsBrightestPoints) {
 }
 
 LangevinResult render_small(const Scene& scene, int threads, std::optional<double> threshold,
-                            std::optional<double> perturbations = 0.0, double scale = 0.32) {
+                            std::optional<double> perturbations = 0.0, double scale = 0.32,
+                            int pilot = 65536) {
   LangevinOptions options;
   options.kernel.scale = scale;
+  options.redistribution.pilot = pilot;
   options.redistribution.perturbations = perturbations;
   options.mode = Mode::Redistribution;
   options.max_depth = 6;
@@ -160,10 +163,11 @@ LangevinResult render_small(const Scene& scene, int threads, std::optional<doubl
 
 TEST(Redistribution, DoesNotDependOnThreads) {
   const Scene& scene = test_scenes().front().scene;
-  const LangevinResult one = render_small(scene, 1, 0.1, 0.5);
+  const auto with = [&](int threads) { return render_small(scene, threads, 0.1, 0.5, 0.32, 8192); };
+  const LangevinResult one = with(1);
   EXPECT_GT(one.statistics.mutations, 500U);
   for (const int threads : {2, 4}) {
-    const LangevinResult other = render_small(scene, threads, 0.1, 0.5);
+    const LangevinResult other = with(threads);
     EXPECT_EQ(one.image.rgb, other.image.rgb);
     EXPECT_EQ(one.statistics.mutations, other.statistics.mutations);
     EXPECT_EQ(one.statistics.small_step.accepted, other.statistics.small_step.accepted);
@@ -172,8 +176,11 @@ TEST(Redistribution, DoesNotDependOnThreads) {
 
 TEST(Redistribution, PlanDoesNotDependOnThreads) {
   const Scene& scene = test_scenes().front().scene;
-  const LangevinResult one = render_small(scene, 1, std::nullopt, std::nullopt);
-  const LangevinResult two = render_small(scene, 2, std::nullopt, std::nullopt);
+  const auto with = [&](int threads) {
+    return render_small(scene, threads, std::nullopt, std::nullopt, 0.32, 16384);
+  };
+  const LangevinResult one = with(1);
+  const LangevinResult two = with(2);
   EXPECT_EQ(one.statistics.threshold, two.statistics.threshold);
   EXPECT_EQ(one.statistics.perturbations, two.statistics.perturbations);
   EXPECT_EQ(one.statistics.mutations_per_sample, two.statistics.mutations_per_sample);
@@ -214,7 +221,7 @@ TEST(LightRate, NoiseIsThatOfSamplesAtTheRate) {
   const Pilot pilot{BrightnessMap({}, 1.0), EmissionGuide(scene)};
   for (const LightRate& at : judge_light_rates(scene, options, 3, pilot)) {
     const EmissionGuide guide = pilot.guide.at_rate(at.rate);
-    BidirectionalTracer tracer(scene, guide, MisHeuristic::Balance, options.max_depth);
+    BidirectionalTracer tracer(scene, guide, MisHeuristic::Power, options.max_depth);
     DrawnNoise noise;
     RunningMean mean;
     for (std::uint64_t i = 0; i < 65536; ++i) {

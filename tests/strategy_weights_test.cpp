@@ -53,7 +53,7 @@ struct GivenPath {
 std::optional<GivenPath> draw_path(const TestScene& test, Rng& rng) {
   const Scene& scene = test.scene;
   const EmissionGuide unguided(scene);
-  const SubpathTracer tracer(scene, unguided, MisHeuristic::Balance);
+  const SubpathTracer tracer(scene, unguided);
   const Vec2d film = rng.uniform2();
   const Vec3d lens = sample_lens(scene.camera(), rng);
   const Vec3d v = scene.camera().direction(film, lens);
@@ -141,8 +141,8 @@ bool possible(const GivenPath& path, int t) {
 /// By t = 1 .. n + 1; 0 where impossible.
 std::vector<double> weights_by_walking(const Scene& scene, const EmissionGuide& guide,
                                        const GivenPath& path, MisHeuristic heuristic) {
-  const SubpathTracer tracer(scene, guide, heuristic);
-  const StrategyWeights weights(guide, heuristic);
+  const SubpathTracer tracer(scene, guide);
+  const StrategyWeights weights(guide);
   const int n = path.length();
   std::vector<SubpathVertex> z;
   const std::vector<Departure> departures = walk_from_sensor(tracer, path, z);
@@ -151,9 +151,9 @@ std::vector<double> weights_by_walking(const Scene& scene, const EmissionGuide& 
   const auto from_light = [&](int k) { return y[static_cast<std::size_t>(n - 1 - k)]; };
   std::vector<double> result;
   for (int t = 1; t <= n + 1; ++t) {
-    double w = 0;
+    OfHeuristics w = OfHeuristics::Zero();
     if (!possible(path, t)) {
-      w = 0;
+      w = OfHeuristics::Zero();
     } else if (t == n + 1) {
       SurfaceHit surface{};
       surface.at = {path.end.p, path.end.n, path.end.n, Vec2d::Zero()};
@@ -178,7 +178,7 @@ std::vector<double> weights_by_walking(const Scene& scene, const EmissionGuide& 
                      std::abs(path.x(1).at.n_g.dot(v)) * path.inverse_r2(scene, 0);
       w = weights.sensor(from_light(1), seen);
     }
-    result.push_back(w);
+    result.push_back(w[static_cast<Eigen::Index>(heuristic)]);
   }
   return result;
 }

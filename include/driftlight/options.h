@@ -153,8 +153,8 @@ struct PathOptions {
 
 /// How the strategies that can make a path share it, by their densities p_i (Veach 1997, 9.2).
 enum class MisHeuristic {
-  Balance,  ///< p_i / sum_j p_j
-  Power,    ///< p_i^2 / sum_j p_j^2
+  Balance = 0,  ///< p_i / sum_j p_j
+  Power = 1,    ///< p_i^2 / sum_j p_j^2
 };
 
 /// The bidirectional path tracer.
