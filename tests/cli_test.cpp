@@ -373,14 +373,14 @@ TEST_F(Cli, TheSceneDepthIsLimitedWithANotice) {
 TEST_F(Cli, TheSameSeedGivesTheSameBytesOnAnyNumberOfThreads) {
   const std::vector<std::vector<std::string>> integrators{
       {"--integrator", "langevin", "--set", "mode=chain", "--set", "bootstrap=4000",
-       "--mutations-per-pixel", "50"},
-      {"--integrator", "langevin", "--spp", "4"},
+       "--mutations-per-pixel", "20"},
+      {"--integrator", "langevin", "--set", "pilot=4096", "--spp", "4"},
       {"--integrator", "pssmlt", "--set", "bootstrap=4000", "--mutations-per-pixel", "20"},
       {"--integrator", "mmlt", "--set", "bootstrap=4000", "--mutations-per-pixel", "20"},
       {"--integrator", "h2mc", "--set", "bootstrap=4000", "--mutations-per-pixel", "2"},
       {"--integrator", "lmc", "--set", "bootstrap=4000", "--mutations-per-pixel", "2"},
       {"--integrator", "mlt", "--set", "bootstrap=4000", "--mutations-per-pixel", "20"},
-      {"--integrator", "erpt", "--spp", "1"},
+      {"--integrator", "erpt", "--set", "pilot=4096", "--spp", "1"},
       {"--integrator", "path", "--spp", "4"},
       {"--integrator", "bdpt", "--spp", "4"},
       {"--integrator", "light", "--spp", "4"},

@@ -248,6 +248,7 @@ LangevinOptions splitting() {
   LangevinOptions options;
   options.mode = Mode::Splitting;
   options.max_depth = 6;
+  options.redistribution.pilot = 8192;
   options.splitting.pilot = 512;
   options.splitting.all = true;
   return options;
