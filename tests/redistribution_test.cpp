@@ -188,7 +188,6 @@ TEST(Redistribution, PlanDoesNotDependOnThreads) {
   EXPECT_EQ(one.image.rgb, two.image.rgb);
 }
 
-// Law: where chains do not move there is nothing to gain by them.
 /// The noise of samples that draw whether they have a light subpath.
 class DrawnNoise {
  public:
@@ -253,6 +252,7 @@ TEST(Redistribution, ChoosesHowManyLightSubpathsPay) {
   EXPECT_EQ(render_small(load_small("point_caustic").scene, 2, 1.0).statistics.light_subpaths, 1.0);
 }
 
+// Law: where chains do not move there is nothing to gain by them.
 TEST(Redistribution, ChoosesAHighThresholdForChainsThatStay) {
   const LoadedScene loaded = load_small("small_hole");
   const LangevinResult moving = render_small(loaded.scene, 2, std::nullopt);
