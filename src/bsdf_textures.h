@@ -2,11 +2,10 @@
 /// The textures of BSDFs.
 #pragma once
 
-#include <memory>
-#include <type_traits>
 #include <variant>
 
 #include "driftlight/bsdf.h"
+#include "nested_bsdfs.h"
 
 namespace driftlight {
 
@@ -14,17 +13,6 @@ namespace driftlight {
 /// copied, as others may share them.
 template <class AnyBsdf, class Visit>
 void for_each_texture(AnyBsdf& bsdf, const Visit& visit) {
-  constexpr bool kIsConst = std::is_const_v<AnyBsdf>;
-  const auto visit_nested = [&](auto& box) {
-    if (box == nullptr) return;
-    if constexpr (kIsConst) {
-      for_each_texture(box->bsdf, visit);
-    } else {
-      const auto copy = std::make_shared<BsdfBox>(*box);
-      for_each_texture(copy->bsdf, visit);
-      box = copy;
-    }
-  };
   std::visit(
       [&](auto& b) {
         if constexpr (requires { b.reflectance; }) visit(b.reflectance);
@@ -34,11 +22,9 @@ void for_each_texture(AnyBsdf& bsdf, const Visit& visit) {
         if constexpr (requires { b.specular_transmittance; }) visit(b.specular_transmittance);
         if constexpr (requires { b.opacity; }) visit(b.opacity);
         if constexpr (requires { b.weight; }) visit(b.weight);
-        if constexpr (requires { b.nested; }) visit_nested(b.nested);
-        if constexpr (requires { b.first; }) visit_nested(b.first);
-        if constexpr (requires { b.second; }) visit_nested(b.second);
       },
       bsdf);
+  for_each_nested(bsdf, [&](auto& nested) { for_each_texture(nested, visit); });
 }
 
 /// True if some texture is not one colour.

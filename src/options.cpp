@@ -184,8 +184,9 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
              "splitting: carries what a pilot finds it better for, or all that samples leave"),
       number_or_auto("levels", splitting.levels, Range<int>{0, 32},
                      "splitting: softer versions of the scene; 0: none, auto: as it needs"),
-      number("level_steps", splitting.steps, Range<int>{0, 1000000},
-             "splitting: steps of a particle at each softer level"),
+      number_or_auto("level_steps", splitting.steps, Range<int>{0, 1000000},
+                     "splitting: steps of a particle at each softer level; auto: 4, or 16 where "
+                     "narrow lobes are softened"),
       number("level_trust", splitting.trust, positive,
              "splitting: trust of the steps of particles"),
       number("last_steps", splitting.last_steps, Range<int>{1, 1000000},

@@ -8,6 +8,7 @@
 namespace driftlight {
 
 Scene::Scene() : surfaces_(std::make_shared<Surfaces>()) {}
+Scene::Scene(const Scene&) = default;
 Scene::~Scene() = default;
 Scene::Scene(Scene&&) noexcept = default;
 Scene& Scene::operator=(Scene&&) noexcept = default;
@@ -58,15 +59,15 @@ void Scene::choose_emitters_by_power() {
 }
 
 Scene Scene::with_emitters(std::vector<Emitter> emitters) const {
-  Scene scene;
-  scene.camera_ = camera_;
-  scene.surfaces_ = surfaces_;
+  Scene scene(*this);
   scene.emitters_ = std::move(emitters);
-  scene.environment_ = environment_;
-  scene.center_ = center_;
-  scene.radius_ = radius_;
-  scene.accelerator_ = accelerator_;
   scene.choose_emitters_by_power();
+  return scene;
+}
+
+Scene Scene::with_bsdfs(std::vector<Bsdf> bsdfs) const {
+  Scene scene(*this);
+  scene.bsdfs_ = std::move(bsdfs);
   return scene;
 }
 

@@ -47,8 +47,8 @@ std::uint32_t SceneBuilder::add_bsdf(Bsdf bsdf) {
   if (lobe_count(bsdf) > kMaxLobes)
     throw InputError("a bsdf of " + std::to_string(lobe_count(bsdf)) + " lobes; the limit is " +
                      std::to_string(kMaxLobes));
-  scene_.surfaces_->bsdfs.push_back(std::move(bsdf));
-  return static_cast<std::uint32_t>(scene_.surfaces_->bsdfs.size() - 1);
+  scene_.bsdfs_.push_back(std::move(bsdf));
+  return static_cast<std::uint32_t>(scene_.bsdfs_.size() - 1);
 }
 
 std::uint32_t SceneBuilder::add_material(const Material& material) {
@@ -125,11 +125,10 @@ Scene SceneBuilder::build() {
   for (Shape& shape : scene.surfaces_->shapes) {
     shape.extent = extent_of(shape.geometry);
     const Material& material = scene.surfaces_->materials.at(shape.material);
-    shape.textured = shape.relief != nullptr ||
-                     is_textured(scene.surfaces_->bsdfs.at(material.front)) ||
-                     (material.back && is_textured(scene.surfaces_->bsdfs.at(*material.back)));
-    shape.anisotropic = !is_isotropic(scene.surfaces_->bsdfs.at(material.front)) ||
-                        (material.back && !is_isotropic(scene.surfaces_->bsdfs.at(*material.back)));
+    shape.textured = shape.relief != nullptr || is_textured(scene.bsdfs_.at(material.front)) ||
+                     (material.back && is_textured(scene.bsdfs_.at(*material.back)));
+    shape.anisotropic = !is_isotropic(scene.bsdfs_.at(material.front)) ||
+                        (material.back && !is_isotropic(scene.bsdfs_.at(*material.back)));
     if (shape.emitter) {
       const bool emits_texture =
           std::get<AreaEmitter>(scene.emitters_[*shape.emitter]).texture != nullptr;

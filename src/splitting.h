@@ -28,11 +28,12 @@ namespace driftlight {
 
 /// Which paths are left to splitting, and in which portions.
 struct SplittingPlan {
-  bool some = false;                    ///< else none
-  std::vector<LobeSequence> left = {};  ///< in order: those that are not, if some are
-  std::size_t known = 0;                ///< sequences that are, and that the pilot has seen
-  double deposit = 1;                   ///< e
-  double rate = 1;                      ///< samples of the top level for each of the scene
+  bool some = false;                     ///< else none
+  bool unseen = true;                    ///< also those that the pilot has not seen, if some are
+  std::vector<LobeSequence> taken = {};  ///< in order: of those that it has seen
+  std::vector<LobeSequence> left = {};   ///< in order: the others that it has seen
+  double deposit = 1;                    ///< e
+  double rate = 1;                       ///< samples of the top level for each of the scene
 
   bool takes(LobeSequence sequence) const;
 };

@@ -210,11 +210,10 @@ SplittingPlan plan_splitting(TemperedScenes& scenes, const Splitter& prototype,
   const SplittingPlan everything{.some = true, .deposit = kPilotDeposit};
   const PilotRun first = run(pilot, everything, 0, samples);
   SplittingPlan plan = everything;
+  plan.unseen = options.splitting.all || !scenes.soften_lobes();
   for (const auto& [sequence, noise] : first.noise) {
-    if (!options.splitting.all && noise.remainder < kWorth * noise.families)
-      plan.left.push_back(sequence);
-    else
-      ++plan.known;
+    const bool leave = !options.splitting.all && noise.remainder < kWorth * noise.families;
+    (leave ? plan.left : plan.taken).push_back(sequence);
   }
   double saved = saving(first, plan);
   if (!options.splitting.all && saved < kLeastSaving * count) return {};

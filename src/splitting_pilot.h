@@ -16,7 +16,10 @@ namespace driftlight {
 /// which the particles of level 0 know too, and far better than samples that seldom find these
 /// paths. Splitting takes the sequences for which the first is far the smaller, if the noise that
 /// it saves matters beside that of the samples' own share. Then it also takes those that the pilot
-/// has not seen: if samples find one of them, then by a rare event that chains would spread.
+/// has not seen: if samples find one of them, then by a rare event that chains would spread. But
+/// not where lobes are softened: a path through n narrow ones is up to 4^n times as bright at each
+/// level as at the one before, so a few of the particles of the longest paths would be far too
+/// bright, while samples do find such paths.
 ///
 /// Levels that little depends on are left out: with d = log E[r^2] / E[r]^2 of the ratio r between
 /// two levels, about the sum of those in between, d is at most that of halving a blur.

@@ -74,7 +74,7 @@ void SplittingShare::report(const Image& image, LangevinStatistics& statistics) 
   if (!plan_.some) return;
   statistics.split_deposit = plan_.deposit;
   statistics.split_rate = plan_.rate;
-  statistics.split_sequences = plan_.known;
+  statistics.split_sequences = plan_.taken.size();
   const double sum = families_.value();
   if (sum > 0.0) statistics.effective_families = sum * sum / squared_families_.value();
   statistics.split_of_few_families = tiles_.luminance_of_fewer(kFewFamilies, image);

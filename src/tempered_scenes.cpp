@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "driftlight/phase_space.h"
 #include "driftlight/walk.h"
+#include "softened_bsdf.h"
 
 namespace driftlight {
 namespace {
@@ -16,14 +18,19 @@ constexpr double kSoftestSun = 0.5;
 constexpr double kSoftestLamp = 0.3;
 /// Lamps that are wider than this are found without help.
 constexpr double kSmallLamp = 0.05;
+/// Least roughness of what has narrow lobes at the softest level: connections then find the way
+/// through glossy lobes.
+constexpr double kSoftestLobe = 0.3;
+/// Chains find their way through lobes that are wider than this: in glass_block they do as well.
+constexpr double kNarrowLobe = 0.01;
 
-/// sigma at level k > 0 of `top`: from `sharpest` to `softest`.
-double sigma_at(int k, int top, double sharpest, double softest) {
+/// Width at level k > 0 of `top`: from `sharpest` to `softest`.
+double width_at(int k, int top, double sharpest, double softest) {
   const double share = top > 1 ? static_cast<double>(top - k) / (top - 1) : 0.0;
   return softest * std::pow(std::min(sharpest, softest) / softest, share);
 }
 
-/// Levels that halve sigma; 0 where there is no need.
+/// Levels that halve a width; 0 where there is no need.
 int levels_between(double sharpest, double softest) {
   const double halvings = std::log2(softest / sharpest);
   return halvings < 1.0 ? 0 : 1 + static_cast<int>(std::lround(halvings));
@@ -93,7 +100,9 @@ double angular_size(const LampExtent& lamp, const Scene& scene) {
   return std::sqrt(least) / distance;
 }
 
-/// What of the scene is blurred.
+// ---- What is softened -----------------------------------------------------------------------
+
+/// What is too small to be found.
 struct Sharp {
   const EnvironmentMap* sun = nullptr;
   struct Lamp {
@@ -102,52 +111,77 @@ struct Sharp {
     double size;
   };
   std::vector<Lamp> lamps;
+  double roughness = kInfinity;  ///< of the narrowest lobe; infinite if none is narrow
+
+  explicit Sharp(const Scene& scene) {
+    for (std::uint32_t i = 0; i < scene.emitters().size(); ++i) {
+      const Emitter& emitter = scene.emitters()[i];
+      if (const auto* map = std::get_if<EnvironmentMap>(&emitter)) sun = map;
+      const auto* area = std::get_if<AreaEmitter>(&emitter);
+      const auto lamp = area != nullptr ? lamp_extent(scene.shapes()[area->shape]) : std::nullopt;
+      if (lamp) lamps.push_back({i, *lamp, angular_size(*lamp, scene)});
+    }
+    for (const Bsdf& bsdf : scene.bsdfs()) roughness = std::min(roughness, least_roughness(bsdf));
+    if (roughness >= kNarrowLobe) roughness = kInfinity;
+  }
+
+  bool has_small_lamp() const {
+    return std::any_of(lamps.begin(), lamps.end(),
+                       [](const Lamp& lamp) { return lamp.size < kSmallLamp; });
+  }
+
+  /// Width of the first level's sun; and least roughness of its narrow lobes.
+  double first_blur() const { return sharpest_blur(*sun); }
+  double first_roughness() const { return 2.0 * roughness; }
+
+  /// As many as the sharpest part needs.
+  int levels() const {
+    int count = sun != nullptr ? levels_between(first_blur(), kSoftestSun) : 0;
+    for (const Lamp& lamp : lamps) count = std::max(count, levels_between(lamp.size, kSoftestLamp));
+    return std::max(count, levels_between(first_roughness(), kSoftestLobe));
+  }
 };
 
-Sharp sharp_parts(const Scene& scene) {
-  Sharp sharp;
-  for (std::uint32_t i = 0; i < scene.emitters().size(); ++i) {
-    const Emitter& emitter = scene.emitters()[i];
-    if (const auto* map = std::get_if<EnvironmentMap>(&emitter)) sharp.sun = map;
-    const auto* area = std::get_if<AreaEmitter>(&emitter);
-    const auto lamp = area != nullptr ? lamp_extent(scene.shapes()[area->shape]) : std::nullopt;
-    if (lamp) sharp.lamps.push_back({i, *lamp, angular_size(*lamp, scene)});
-  }
-  return sharp;
+/// Those with narrow lobes at level k.
+std::vector<Bsdf> softer_bsdfs(const Scene& scene, const Sharp& sharp, int k, int top) {
+  std::vector<Bsdf> bsdfs(scene.bsdfs().begin(), scene.bsdfs().end());
+  const double least = width_at(k, top, sharp.first_roughness(), kSoftestLobe);
+  for (Bsdf& bsdf : bsdfs)
+    if (least_roughness(bsdf) < kNarrowLobe) bsdf = softened(std::move(bsdf), least);
+  return bsdfs;
 }
 
-/// As many as the sharpest part needs.
-int levels_for(const Sharp& sharp) {
-  int count = sharp.sun != nullptr ? levels_between(sharpest_blur(*sharp.sun), kSoftestSun) : 0;
+/// Each softer than that of the scene below.
+std::vector<Emitter> softer_emitters(const Scene& scene, const Scene& below, const Sharp& sharp,
+                                     int k, int top) {
+  std::vector<Emitter> emitters(below.emitters().begin(), below.emitters().end());
   for (const Sharp::Lamp& lamp : sharp.lamps)
-    if (lamp.size < kSmallLamp) count = std::max(count, levels_between(lamp.size, kSoftestLamp));
-  return count;
+    emitters[lamp.emitter] =
+        BlurredAreaEmitter(std::get<AreaEmitter>(scene.emitters()[lamp.emitter]), lamp.extent,
+                           width_at(k, top, lamp.size, kSoftestLamp));
+  if (sharp.sun != nullptr) {
+    const double sigma = width_at(k, top, sharp.first_blur(), kSoftestSun);
+    const double before = k > 1 ? width_at(k - 1, top, sharp.first_blur(), kSoftestSun) : 0.0;
+    // Variances of successive blurs add up.
+    Emitter& sun = emitters[*scene.environment()];
+    sun = std::get<EnvironmentMap>(sun).blurred(std::sqrt(sigma * sigma - before * before));
+  }
+  return emitters;
 }
 
 }  // namespace
 
 TemperedScenes::TemperedScenes(const Scene& scene, std::optional<int> levels) : scene_(&scene) {
-  const Sharp sharp = sharp_parts(scene);
-  if (sharp.sun == nullptr && sharp.lamps.empty()) return;
-  const int top = levels.value_or(levels_for(sharp));
+  Sharp sharp(scene);
+  if (!levels && !sharp.has_small_lamp()) sharp.lamps.clear();
+  if (sharp.sun == nullptr && sharp.lamps.empty() && sharp.roughness == kInfinity) return;
+  const int top = levels.value_or(sharp.levels());
   blurs_lamps_ = top > 0 && !sharp.lamps.empty();
-  double before = 0.0;
+  softens_lobes_ = top > 0 && sharp.roughness < kInfinity;
   for (int k = 1; k <= top; ++k) {
-    const std::span<const Emitter> below = (*this)[k - 1].emitters();
-    std::vector<Emitter> emitters(below.begin(), below.end());
-    for (const Sharp::Lamp& lamp : sharp.lamps)
-      emitters[lamp.emitter] =
-          BlurredAreaEmitter(std::get<AreaEmitter>(scene.emitters()[lamp.emitter]), lamp.extent,
-                             sigma_at(k, top, lamp.size, kSoftestLamp));
-    if (sharp.sun != nullptr) {
-      const double sigma = sigma_at(k, top, sharpest_blur(*sharp.sun), kSoftestSun);
-      // Variances of successive blurs add up.
-      const double added = std::sqrt(sigma * sigma - before * before);
-      emitters[*scene.environment()] =
-          std::get<EnvironmentMap>(below[*scene.environment()]).blurred(added);
-      before = sigma;
-    }
-    softer_.push_back(std::make_unique<const Scene>(scene.with_emitters(std::move(emitters))));
+    Scene softer = scene.with_emitters(softer_emitters(scene, (*this)[k - 1], sharp, k, top));
+    if (softens_lobes_) softer = softer.with_bsdfs(softer_bsdfs(scene, sharp, k, top));
+    softer_.push_back(std::make_unique<const Scene>(std::move(softer)));
   }
 }
 

@@ -3,8 +3,9 @@
 ///
 /// Level 0 is the scene itself, and each level k > 0 is softer than the one before: an environment
 /// map is blurred with the standard deviation sigma_k, a geometric sequence from the size of its
-/// sun up to wide, and small area emitters likewise (BlurredAreaEmitter). Surfaces, materials and
-/// indices are the same at all levels, so a path of one level, with its topology and coordinates,
+/// sun up to wide, small area emitters likewise (BlurredAreaEmitter), and narrow lobes of rough
+/// BSDFs have at least a roughness that grows in the same way. Shapes, lobes and indices are the
+/// same at all levels, so a path of one level, with its topology and coordinates,
 /// is one of all; and its contribution is positive at level k wherever it is at level k - 1.
 /// Two things are not alike. Where a blurred lamp ends a path there is no vertex: at level 0 its
 /// last hit is to be traced. And only rays see it that leave a surface: lamps that the sensor sees
@@ -32,6 +33,8 @@ class TemperedScenes {
   const Scene& operator[](int level) const {
     return level == 0 ? *scene_ : *softer_[static_cast<std::size_t>(level - 1)];
   }
+  /// Whether narrow lobes are rougher at the softer levels.
+  bool soften_lobes() const { return softens_lobes_; }
   /// Leaves out a level between the scene and the softest one. The others' scenes stay where they
   /// are.
   void leave_out(int level) { softer_.erase(softer_.begin() + (level - 1)); }
@@ -50,6 +53,7 @@ class TemperedScenes {
   const Scene* scene_;
   std::vector<std::unique_ptr<const Scene>> softer_;
   bool blurs_lamps_ = false;
+  bool softens_lobes_ = false;
 };
 
 }  // namespace driftlight

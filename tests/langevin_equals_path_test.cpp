@@ -90,7 +90,9 @@ const std::map<std::string, Way>& ways() {
        {.mode = Mode::Redistribution,
         .phase_space = PhaseSpace::Bidirectional,
         .redistribution = {.perturbations = 0}}},
-      {"splitting", {.mode = Mode::Splitting, .splitting = {.all = true, .levels = std::nullopt}}},
+      {"splitting",
+       {.mode = Mode::Splitting,
+        .splitting = {.all = true, .levels = std::nullopt, .steps = std::nullopt}}},
       {"two_levels",
        {.mode = Mode::Splitting,
         .drift = Drift::None,
@@ -104,7 +106,7 @@ const std::map<std::string, Way>& ways() {
        {.mode = Mode::Splitting,
         .phase_space = PhaseSpace::Bidirectional,
         .redistribution = {.threshold = 20},
-        .splitting = {.all = true, .levels = 4}}}};
+        .splitting = {.all = true, .levels = 4, .steps = std::nullopt}}}};
   return kWays;
 }
 
@@ -353,7 +355,31 @@ TEST(LangevinEqualsBdpt, PointCaustic) {
   }
 }
 
-/// The same by mutations of vertices.
+/// Narrow lobes toward both ends, by particles from rougher glass against chains. Up to three of
+/// them: with more a few of all particles carry much.
+TEST(SplittingEqualsRedistribution, GlassBlock) {
+  const LoadedScene loaded = load_small("glass_block", {{"alpha", "0.009"}});
+  LangevinOptions options;
+  options.max_depth = 4;
+  options.redistribution.perturbations = 0;
+  options.redistribution.pilot = 16384;
+  options.splitting.all = true;
+  options.splitting.pilot = 2048;
+  const auto tiles = [&](Mode mode, double samples) {
+    options.mode = mode;
+    return tiles_over_runs([&](std::uint64_t seed) {
+      RenderOptions render;
+      render.seed = seed + (mode == Mode::Splitting ? 0 : 1000);
+      const LangevinResult result = render_langevin(loaded.scene, options, render, samples);
+      EXPECT_EQ(result.statistics.split_sequences > 0, mode == Mode::Splitting);
+      return result.image;
+    });
+  };
+  const auto chains = tiles(Mode::Redistribution, 150);
+  test::expect_equal_tiles("glass_block", tiles(Mode::Splitting, 30), chains, 0.04);
+}
+
+/// point_caustic by mutations of vertices.
 TEST(MutationsEqualBdpt, DISABLED_PointCaustic) {
   const LoadedScene loaded = load_small("point_caustic");
   const auto traced = tiles_over_runs([&](std::uint64_t seed) {

@@ -11,6 +11,7 @@
 #include "driftlight/scene_check.h"
 #include "family_tiles.h"
 #include "lobe_sequence.h"
+#include "softened_bsdf.h"
 #include "support/test_scenes.h"
 #include "support/tiles.h"
 #include "tempered_scenes.h"
@@ -163,12 +164,12 @@ TEST(TemperedScenes, LampsShineWhereverTheSceneIsLit) {
   }
 }
 
-/// Jets, derivatives by hand and differences agree on paths to a blurred lamp.
-TEST(TemperedScenes, DerivativesFollowTheLevel) {
-  const LoadedScene loaded = wide_lamp();
-  const TemperedScenes levels(loaded.scene, 3);
+/// Jets, derivatives by hand and differences agree at all levels; how many were compared.
+int check_derivatives(const Scene& scene, int count,
+                      const std::vector<PathSampler::Sample>& paths) {
+  const TemperedScenes levels(scene, count);
   int compared = 0;
-  for (const PathSampler::Sample& path : paths_to_lamp(loaded, 60))
+  for (const PathSampler::Sample& path : paths)
     for (int k = 1; k <= levels.top(); ++k) {
       const PathCheck check = check_path(levels[k], path.topology, path.coordinates);
       for (const Quantity quantity : kQuantities) {
@@ -177,7 +178,85 @@ TEST(TemperedScenes, DerivativesFollowTheLevel) {
         compared += check[quantity].compared;
       }
     }
-  EXPECT_GT(compared, 1000);
+  return compared;
+}
+
+TEST(TemperedScenes, DerivativesFollowBlurredLamps) {
+  const LoadedScene loaded = wide_lamp();
+  EXPECT_GT(check_derivatives(loaded.scene, 3, paths_to_lamp(loaded, 60)), 1000);
+}
+
+/// Paths with narrow lobes, with coordinates from both ends.
+std::vector<PathSampler::Sample> paths_through_block(const LoadedScene& loaded, std::size_t count) {
+  std::vector<PathSampler::Sample> paths;
+  for (std::uint64_t i = 0; paths.size() < count; ++i) {
+    const auto path =
+        draw_light_path(loaded.scene, loaded.max_depth.value(), 3, i, PhaseSpace::Bidirectional);
+    if (path && path->topology.length() > 2) paths.push_back(*path);
+  }
+  return paths;
+}
+
+TEST(TemperedScenes, DerivativesFollowTheRoughness) {
+  const LoadedScene loaded = load_small("glass_block", {{"alpha", "0.009"}});
+  EXPECT_GT(check_derivatives(loaded.scene, 3, paths_through_block(loaded, 60)), 1000);
+}
+
+/// Twice the scene's at the first level, then about twice that of the level before; and a path of
+/// the scene is one of all levels, and nowhere far darker.
+TEST(TemperedScenes, RoughnessGrowsInSteps) {
+  const LoadedScene loaded = load_small("glass_block", {{"alpha", "0.009"}});
+  const TemperedScenes levels(loaded.scene, std::nullopt);
+  const auto roughness = [&](int k) {
+    double least = kInfinity;
+    for (const Bsdf& bsdf : levels[k].bsdfs()) least = std::min(least, least_roughness(bsdf));
+    return least;
+  };
+  ASSERT_EQ(levels.top(), 5);
+  EXPECT_EQ(roughness(0), 0.009);
+  EXPECT_DOUBLE_EQ(roughness(1), 0.018);
+  EXPECT_DOUBLE_EQ(roughness(5), 0.3);
+  for (int k = 1; k <= levels.top(); ++k) EXPECT_LT(roughness(k) / roughness(k - 1), 2.1);
+  for (const PathSampler::Sample& path : paths_through_block(loaded, 200)) {
+    ASSERT_TRUE(levels.carry(path.topology));
+    double before = contribution(loaded.scene, path.topology, path.coordinates).log_target;
+    for (int k = 1; k <= levels.top(); ++k) {
+      const double here = contribution(levels[k], path.topology, path.coordinates).log_target;
+      EXPECT_LT(before - here, path.topology.scatter_count * std::log(6.0)) << "level " << k;
+      before = here;
+    }
+  }
+}
+
+TEST(TemperedScenes, LeaveWideLobesAlone) {
+  const LoadedScene loaded = load_small("glass_block", {{"alpha", "0.1"}});
+  EXPECT_EQ(TemperedScenes(loaded.scene, std::nullopt).top(), 0);
+  EXPECT_EQ(TemperedScenes(loaded.scene, 2).top(), 0);
+}
+
+TEST(SoftenedBsdf, IsAsRoughAsAskedFor) {
+  const RoughConductor metal{.microfacets = {Distribution::Ggx, 0.01, 0.2}};
+  const auto rough = std::get<RoughConductor>(softened(metal, 0.05));
+  EXPECT_EQ(rough.microfacets.alpha_u, 0.05);
+  EXPECT_EQ(rough.microfacets.alpha_v, 0.2);
+  // A blend does not change what it shares.
+  const auto box = [](const Bsdf& bsdf) { return std::make_shared<const BsdfBox>(bsdf); };
+  const Blend blend{.first = box(metal), .second = box(Diffuse{})};
+  const Bsdf all[] = {metal,
+                      Phong{.exponent = 2000},
+                      Ward{.alpha_u = 0.3, .alpha_v = 0.02},
+                      RoughDielectric{.microfacets = {Distribution::Beckmann, 0.01}},
+                      Coating{.nested = box(metal)},
+                      Mask{.nested = box(Bsdf(blend))}};
+  for (const Bsdf& bsdf : all) {
+    const double least = least_roughness(bsdf);
+    EXPECT_LT(least, 0.05);
+    EXPECT_NEAR(least_roughness(softened(bsdf, 0.05)), 0.05, 1e-12);
+    EXPECT_NEAR(least_roughness(softened(bsdf, 0.5 * least)), least, 1e-12);
+    EXPECT_EQ(least_roughness(bsdf), least);
+  }
+  for (const Bsdf& smooth : {Bsdf(Diffuse{}), Bsdf(Conductor{}), Bsdf(Mask{})})
+    EXPECT_EQ(least_roughness(smooth), kInfinity);
 }
 
 /// The power that a lamp sends toward a point is about that of the lamp itself at all levels.

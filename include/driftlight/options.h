@@ -103,8 +103,9 @@ struct SplittingOptions {
   bool all = false;
   /// Softer levels above the scene; none: as the scene needs.
   std::optional<int> levels;
-  /// Steps of a particle at each level.
-  int steps = 4;
+  /// Steps of a particle at each level; none: 4, or 16 where narrow lobes are softened, in which a
+  /// particle has to find its way.
+  std::optional<int> steps;
   /// KernelOptions::trust of all steps of particles. A family that cannot move in a lobe grows or
   /// dies as a whole from level to level; to move across lobes matters more than far over the film.
   double trust = 0.05;

@@ -70,7 +70,7 @@ class Scene {
   const Camera& camera() const { return camera_; }
   std::span<const Shape> shapes() const { return surfaces_->shapes; }
   std::span<const Material> materials() const { return surfaces_->materials; }
-  std::span<const Bsdf> bsdfs() const { return surfaces_->bsdfs; }
+  std::span<const Bsdf> bsdfs() const { return bsdfs_; }
   std::span<const Emitter> emitters() const { return emitters_; }
   std::optional<std::uint32_t> environment() const { return environment_; }
   /// Bounding sphere of all shapes and finite emitters.
@@ -128,9 +128,12 @@ class Scene {
   bool is_blurred(std::uint32_t emitter) const {
     return std::holds_alternative<BlurredAreaEmitter>(emitters_[emitter]);
   }
-  /// The same surfaces, which both share, under other emitters: each in the place of that of the
+  /// The same shapes, which both share, under other emitters: each in the place of that of the
   /// same index, on the same shape or also at infinity.
   Scene with_emitters(std::vector<Emitter> emitters) const;
+  /// The same shapes, which both share, with other BSDFs: each in the place of that of the same
+  /// index, with the same lobes and textures.
+  Scene with_bsdfs(std::vector<Bsdf> bsdfs) const;
 
  private:
   friend class SceneBuilder;
@@ -138,15 +141,17 @@ class Scene {
   struct Surfaces {
     std::vector<Shape> shapes;
     std::vector<Material> materials;
-    std::vector<Bsdf> bsdfs;
   };
   Scene();
+  /// Shares the shapes.
+  Scene(const Scene&);
   /// Embree's trees over the shapes, which must not move. Throws RuntimeError if it fails.
   static std::shared_ptr<const Accelerator> accelerate(const std::vector<Shape>& shapes);
   void choose_emitters_by_power();
 
   Camera camera_;
   std::shared_ptr<Surfaces> surfaces_;
+  std::vector<Bsdf> bsdfs_;
   std::vector<Emitter> emitters_;
   std::optional<std::uint32_t> environment_;
   DiscreteDistribution emitter_choice_;
