@@ -5,12 +5,11 @@
 /// map is blurred with the standard deviation sigma_k, a geometric sequence from the size of its
 /// sun up to wide, small area emitters likewise (BlurredAreaEmitter), and narrow lobes of rough
 /// BSDFs have at least a roughness that grows in the same way. Shapes, lobes and indices are the
-/// same at all levels, so a path of one level, with its topology and coordinates,
-/// is one of all; and its contribution is positive at level k wherever it is at level k - 1.
-/// Two things are not alike. Where a blurred lamp ends a path there is no vertex: at level 0 its
-/// last hit is to be traced. And only rays see it that leave a surface: lamps that the sensor sees
-/// directly, and paths in whose chart a point on an area emitter is among the coordinates, are left
-/// to level 0.
+/// same at all levels, so a path of one level, with its topology and coordinates, is one of all;
+/// and its contribution is positive at level k wherever it is at level k - 1. Two things are not
+/// alike. Where a blurred lamp ends a path there is no vertex: at level 0 its last hit is to be
+/// traced. And only rays see it that leave a surface: lamps that the sensor sees directly, and
+/// paths in whose chart a point on an area emitter is among the coordinates, are left to level 0.
 #pragma once
 
 #include <memory>
@@ -24,8 +23,9 @@ namespace driftlight {
 
 class TemperedScenes {
  public:
-  /// So many softer levels; none: as many as halve sigma from one to the next, 0 if the scene has
-  /// nothing sharp. The scene must outlive this.
+  /// So many softer levels, with all area emitters blurred; none: as many as halve what is sharp
+  /// from one to the next, 0 if nothing is, and area emitters are blurred only if one is small. The
+  /// scene must outlive this.
   TemperedScenes(const Scene& scene, std::optional<int> levels);
 
   /// The softest level.
