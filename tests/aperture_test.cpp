@@ -5,7 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <cmath>
 #include <optional>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "driftlight/scene_file.h"
 #include "driftlight/small_step.h"
 #include "driftlight/walk.h"
+#include "support/dense.h"
 #include "support/places.h"
 #include "support/test_scenes.h"
 
@@ -190,11 +190,11 @@ TEST(Aperture, RowsAreDerivatives) {
       const Chart chart(test.scene, path.topology, path.coordinates);
       const int segments = path.topology.length();
       Apertures apertures;
-      Eigen::MatrixXd added = Eigen::MatrixXd::Zero(chart.dimension(), chart.dimension());
+      Matrix added = Matrix::Zero(chart.dimension(), chart.dimension());
       for (int k = 0; k < segments; ++k) {
         const Aperture aperture = any_aperture(test.scene, path, k, rng);
         apertures.add(aperture);
-        Eigen::MatrixXd rays(3, chart.dimension());
+        Matrix rays(3, chart.dimension());
         for (int j = 0; j < chart.dimension(); ++j) {
           const auto slope = [&](double h) -> Vec3d {
             const Vector step = h * Vector::Unit(chart.dimension(), j);
@@ -209,9 +209,10 @@ TEST(Aperture, RowsAreDerivatives) {
           for (int i = 0; i < 3; ++i) rays(i, j) = (4.0 * fine[i] - coarse[i]) / 3.0;
         }
         for (const Vec3d& row : aperture.rows) {
-          const Eigen::RowVectorXd jacobian =
-              (row.x() * rays.row(0) + row.y() * rays.row(1) + row.z() * rays.row(2)) / 3.0;
-          added += jacobian.transpose() * jacobian;
+          const Vector jacobian =
+              (row.x() * rays.row(0) + row.y() * rays.row(1) + row.z() * rays.row(2)).transpose() /
+              3.0;
+          added += jacobian * jacobian.transpose();
         }
       }
       if (!added.allFinite() || added.norm() > 1e4) continue;
@@ -269,19 +270,18 @@ TEST(Aperture, DivergenceSeesTheRows) {
     const Apertures apertures = apertures_of(test.scene, path);
     if (apertures.count() == 0) continue;
     const Chart chart(test.scene, path.topology, path.coordinates);
-    const auto inverse = [&](const Chart& at) {
+    const auto inverse_at = [&](const Chart& at) {
       Linearization linear;
       linearize(test.scene, path.topology, at, DerivativeMethod::Hand, {false, true}, linear);
       constrain(test.scene, path.topology, at, apertures, linear);
-      const Eigen::MatrixXd q = constraint_matrix(linear);
-      return Eigen::MatrixXd(q.inverse());
+      return inverse(constraint_matrix(linear));
     };
     Vector expected = Vector::Zero(chart.dimension());
     for (int j = 0; j < chart.dimension(); ++j) {
       const double h = 1e-5;
       const Vector step = h * Vector::Unit(chart.dimension(), j);
-      expected +=
-          (inverse(chart.displaced(step)) - inverse(chart.displaced(-step))).col(j) / (2.0 * h);
+      expected += (inverse_at(chart.displaced(step)) - inverse_at(chart.displaced(-step))).col(j) /
+                  (2.0 * h);
     }
     const Vector found =
         divergence(test.scene, path.topology, chart, DerivativeMethod::Hand, apertures);

@@ -5,7 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,6 +14,7 @@
 #include "driftlight/constraints.h"
 #include "driftlight/exact_divergence.h"
 #include "driftlight/gradient.h"
+#include "support/dense.h"
 #include "support/path_classes.h"
 #include "support/test_scenes.h"
 
@@ -22,7 +22,6 @@ namespace driftlight::test {
 namespace {
 
 using Path = PathSampler::Sample;
-using Dense = Eigen::MatrixXd;
 
 /// Sums Q - floor = 1/9 sum w J^T J as jets: the value and its derivatives over all coordinates.
 template <int N>
@@ -39,15 +38,15 @@ class JetMatrix {
         q_(i, j) += precision * residual.v[i] * residual.v[j] * (1.0 / 9.0);
   }
 
-  Dense value() const {
-    return Dense::NullaryExpr(dimension_, dimension_, [&](Eigen::Index i, Eigen::Index j) {
+  Matrix value() const {
+    return Matrix::NullaryExpr(dimension_, dimension_, [&](Eigen::Index i, Eigen::Index j) {
       return q_(i, j).a + (i == j ? kConstraintFloor : 0.0);
     });
   }
   /// dQ / d delta_k
-  Dense derivative(int k) const {
-    return Dense::NullaryExpr(dimension_, dimension_,
-                              [&](Eigen::Index i, Eigen::Index j) { return q_(i, j).v[k]; });
+  Matrix derivative(int k) const {
+    return Matrix::NullaryExpr(dimension_, dimension_,
+                               [&](Eigen::Index i, Eigen::Index j) { return q_(i, j).v[k]; });
   }
 
  private:
@@ -76,7 +75,7 @@ JetMatrix<N> jet_matrix(const Scene& scene, const Path& path, const Chart& chart
 template <int N>
 Vector plain_divergence(const Scene& scene, const Path& path, const Chart& chart) {
   const JetMatrix<N> q = jet_matrix<N>(scene, path, chart);
-  const Dense inverse = q.value().inverse();
+  const Matrix inverse = test::inverse(q.value());
   Vector sum = Vector::Zero(chart.dimension());
   for (int j = 0; j < chart.dimension(); ++j) sum += q.derivative(j) * inverse.col(j);
   return -inverse * sum;

@@ -4,8 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/normal.hpp>
@@ -16,14 +14,12 @@
 #include "driftlight/divergence.h"
 #include "driftlight/gradient.h"
 #include "support/chi_square.h"
+#include "support/dense.h"
 #include "support/t_test.h"
 #include "support/test_scenes.h"
 
 namespace driftlight::test {
 namespace {
-
-using Dense = Eigen::MatrixXd;
-using DenseVector = Eigen::VectorXd;
 
 constexpr double kC = 0.40824829046386301637;  // 1 / sqrt(6)
 
@@ -36,27 +32,26 @@ struct LocalState {
 
 LocalState random_state(int dimension, double slope, Rng& rng) {
   const auto normal = [&] { return rng.normal(); };
-  const Dense a = Dense::NullaryExpr(dimension, dimension, normal);
-  DenseVector stretch(dimension);
+  const Matrix a = Matrix::NullaryExpr(dimension, dimension, normal);
+  Vector stretch(dimension);
   for (int i = 0; i < dimension; ++i) stretch[i] = std::pow(10.0, 2.0 * rng.uniform());
   LocalState state;
-  state.q = a.transpose() * stretch.asDiagonal() * a + 0.1 * Dense::Identity(dimension, dimension);
-  state.gradient = slope * DenseVector::NullaryExpr(dimension, normal);
-  state.divergence_of_inverse = 0.1 * DenseVector::NullaryExpr(dimension, normal);
+  state.q = a.transpose() * stretch.asDiagonal() * a + 0.1 * Matrix::Identity(dimension, dimension);
+  state.gradient = slope * Vector::NullaryExpr(dimension, normal);
+  state.divergence_of_inverse = 0.1 * Vector::NullaryExpr(dimension, normal);
   return state;
 }
 
 /// (E63.3), (E63.8) and (E63.9) word for word, with dense matrices.
 struct DirectStep {
-  Dense t;
-  DenseVector a;
+  Matrix t;
+  Vector a;
   double dt;
 
   DirectStep(const KernelOptions& options, const LocalState& state, double scale) {
-    const Dense l = Eigen::LLT<Dense>(state.q).matrixL();
-    t = scale * kC * l.inverse().transpose();
-    const Dense tt = t * t.transpose();
-    a = DenseVector::Zero(state.q.rows());
+    t = scale * kC * inverse(cholesky(state.q)).transpose();
+    const Matrix tt = t * t.transpose();
+    a = Vector::Zero(state.q.rows());
     dt = 1.0 / 3.0;
     if (options.drift != Drift::None) {
       a = -tt * state.gradient;
@@ -67,8 +62,8 @@ struct DirectStep {
     }
     dt = std::min(dt / options.safety, options.time_step_cap);
   }
-  Dense covariance() const { return 2.0 * dt * t * t.transpose(); }
-  DenseVector mean() const { return dt * a; }
+  Matrix covariance() const { return 2.0 * dt * t * t.transpose(); }
+  Vector mean() const { return dt * a; }
 };
 
 StepDistribution step_of(const KernelOptions& options, const LocalState& state) {
@@ -112,11 +107,11 @@ TEST(StepDistribution, FollowsTheFormulas) {
                       1e-9 * direct.mean().norm() + 1e-15);
             Vector delta(dimension);
             for (int i = 0; i < dimension; ++i) delta[i] = rng.normal();
-            const DenseVector r = delta - direct.mean();
-            const Dense covariance = direct.covariance();
+            const Vector r = delta - direct.mean();
+            const Matrix root = cholesky(direct.covariance());
             const double expected =
-                -0.5 * (r.dot(covariance.ldlt().solve(r)) + std::log(covariance.determinant()) +
-                        dimension * std::log(2.0 * kPi));
+                -0.5 * ((inverse(root) * r).squaredNorm() + dimension * std::log(2.0 * kPi)) -
+                root.diagonal().array().log().sum();
             EXPECT_NEAR(step.log_density(delta, scale), expected, 1e-8 * std::abs(expected));
           }
         }
@@ -154,9 +149,9 @@ TEST(StepDistribution, BrownianCovarianceIsANinthOfTheInverse) {
   KernelOptions options = options_of(Drift::None);
   const LocalState state = random_state(3, 1.0, rng);
   const StepDistribution step = step_of(options, state);
-  const Dense expected = Dense(state.q).inverse() / 9.0;
+  const Matrix expected = inverse(state.q) / 9.0;
   const int count = 40000;
-  Dense second = Dense::Zero(3, 3);
+  Matrix second = Matrix::Zero(3, 3);
   for (int i = 0; i < count; ++i) {
     const Vector delta = step.sample(1.0, rng);
     second += delta * delta.transpose() / count;
@@ -201,13 +196,12 @@ TEST(StepDistribution, SampleFollowsItsDensity) {
         const LocalState state = random_state(dimension, 2.0, rng);
         const StepDistribution step = step_of(options, state);
         const DirectStep direct(options, state, scale);
-        const Dense factor = Eigen::LLT<Dense>(direct.covariance()).matrixL();
+        const Matrix whitening = inverse(cholesky(direct.covariance()));
         const boost::math::chi_squared radial(dimension);
         std::vector<double> radii;
         std::vector<std::vector<double>> components(static_cast<std::size_t>(dimension));
         for (int i = 0; i < count; ++i) {
-          const DenseVector r = factor.triangularView<Eigen::Lower>().solve(
-              DenseVector(step.sample(scale, rng) - direct.mean()));
+          const Vector r = whitening * (step.sample(scale, rng) - direct.mean());
           radii.push_back(boost::math::cdf(radial, r.squaredNorm()));
           for (int j = 0; j < dimension; ++j)
             components[static_cast<std::size_t>(j)].push_back(boost::math::cdf(normal, r[j]));

@@ -4,28 +4,26 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <vector>
 
 #include "driftlight/hessian.h"
 #include "driftlight/small_step.h"
+#include "support/dense.h"
 #include "support/test_scenes.h"
 
 namespace driftlight::test {
 namespace {
 
 using Path = PathSampler::Sample;
-using Dense = Eigen::MatrixXd;
 
 Vector zero(const Chart& chart) { return Vector::Zero(chart.dimension()); }
 
 /// Central differences of the gradient along all coordinates of the chart.
-Dense differences_of_gradient(const Scene& scene, const Path& path, const Chart& chart,
-                              const Vector& widths) {
+Matrix differences_of_gradient(const Scene& scene, const Path& path, const Chart& chart,
+                               const Vector& widths) {
   const int d = chart.dimension();
-  Dense h(d, d);
+  Matrix h(d, d);
   Linearization at;
   for (int j = 0; j < d; ++j) {
     const double step = 1e-4 * widths[j];
@@ -67,11 +65,11 @@ TEST(Hessian, IsTheDerivativeOfTheGradient) {
   const auto errors =
       errors_of(200, 161, [](const Scene& scene, const Path& path, const Chart& chart) {
         const Vector widths = widths_of(scene, path, chart);
-        const auto scaled = [&](const Dense& h) -> Dense {
+        const auto scaled = [&](const Matrix& h) -> Matrix {
           return widths.asDiagonal() * h * widths.asDiagonal();
         };
-        const Dense exact = scaled(hessian(scene, path.topology, chart, zero(chart)));
-        const Dense numeric = scaled(differences_of_gradient(scene, path, chart, widths));
+        const Matrix exact = scaled(hessian(scene, path.topology, chart, zero(chart)));
+        const Matrix numeric = scaled(differences_of_gradient(scene, path, chart, widths));
         return (exact - numeric).norm() / (exact.norm() + 1e-3);
       });
   // The tail: seams of textures within a step, and what rounding leaves of narrow lobes.
@@ -84,12 +82,11 @@ TEST(Precision, OfTheHessianIsItsAbsoluteValue) {
   const TestScene& test = test_scenes().front();
   for (const Path& path : light_paths(test, 100, 162)) {
     const Chart chart(test.scene, path.topology, path.coordinates);
-    const Dense h = hessian(test.scene, path.topology, chart, zero(chart));
-    const Dense q = hessian_precision(test.scene, path.topology, chart, zero(chart));
-    const Dense rest = 9.0 * (q - kConstraintFloor * Dense::Identity(q.rows(), q.cols()));
+    const Matrix h = hessian(test.scene, path.topology, chart, zero(chart));
+    const Matrix q = hessian_precision(test.scene, path.topology, chart, zero(chart));
+    const Matrix rest = 9.0 * (q - kConstraintFloor * Matrix::Identity(q.rows(), q.cols()));
     EXPECT_LT((rest * rest - h * h).norm(), 1e-9 * (1.0 + h.squaredNorm()));
-    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Dense>(q).eigenvalues().minCoeff(),
-              0.99 * kConstraintFloor);
+    EXPECT_GT(eigenvalues(q)[0], 0.99 * kConstraintFloor);
   }
 }
 
@@ -100,18 +97,18 @@ TEST(Precision, DiagonalIsThatOfTheConstraints) {
       const Chart chart(test.scene, path.topology, path.coordinates);
       Linearization at;
       linearize(test.scene, path.topology, chart, DerivativeMethod::Hand, {false, true}, at);
-      const Dense q = constraint_matrix(at);
-      const Dense diagonal = diagonal_precision(at);
-      EXPECT_LT((Dense(q.diagonal().asDiagonal()) - diagonal).norm(), 1e-12 * q.norm());
+      const Matrix q = constraint_matrix(at);
+      const Matrix diagonal = diagonal_precision(at);
+      EXPECT_LT((Matrix(q.diagonal().asDiagonal()) - diagonal).norm(), 1e-12 * q.norm());
     }
 }
 
 /// sum_j d (Q^-1)_ij / d delta_j, by differences of the inverse itself.
 Vector differences_of_inverse(const Scene& scene, const Path& path, const Chart& chart,
                               PreconditionerKind kind, double floor) {
-  const auto inverse_at = [&](const Vector& delta) -> Dense {
+  const auto inverse_at = [&](const Vector& delta) -> Matrix {
     if (kind == PreconditionerKind::Hessian)
-      return Dense(hessian_precision(scene, path.topology, chart, delta, floor)).inverse();
+      return inverse(hessian_precision(scene, path.topology, chart, delta, floor));
     Matrix q;
     constraint_matrix(scene, path.topology, chart, delta, q);
     q.diagonal().array() += floor - kConstraintFloor;

@@ -3,7 +3,6 @@
 /// the right stationary law with Hastings, and what the divergence does without.
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <array>
 #include <boost/math/quadrature/gauss_kronrod.hpp>
@@ -16,6 +15,7 @@
 
 #include "driftlight/chain.h"
 #include "driftlight/kernel.h"
+#include "support/dense.h"
 #include "support/t_test.h"
 #include "support/test_scenes.h"
 
@@ -58,7 +58,7 @@ class GaussianTarget {
     const Matrix a{{1.0, 0.0, 0.0}, {0.6, 0.7, 0.0}, {-0.3, 0.4, 0.5}};
     factor_ = a;
     covariance_ = a * a.transpose();
-    precision_ = Eigen::MatrixXd(covariance_).inverse();
+    precision_ = inverse(covariance_);
     wave_ = Vector::Zero(3);
     wave_ << 0.9, 0.8, -0.5;
   }
