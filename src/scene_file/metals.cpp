@@ -57,16 +57,177 @@ constexpr MetalSample kTungsten[] = {
     {793.8, 3.705, 2.733}, {814.7, 3.596, 2.757}, {832.7, 3.492, 2.801},
 };
 
+constexpr MetalSample kAmorphousCarbon[] = {
+    {364.7, 2, 0.92},   {387.5, 2.06, 0.91}, {476.9, 2.24, 0.88},
+    {516.6, 2.3, 0.87}, {563.6, 2.38, 0.82}, {619.9, 2.43, 0.75},
+    {688.8, 2.43, 0.7}, {774.9, 2.33, 0.71}, {885.6, 2.24, 0.8},
+};
+
+constexpr MetalSample kAluminiumArsenide[] = {
+    {362.4, 4.188, 0.3018},    {379.4, 4.015, 0.2203},  {394.9, 3.886, 0.1457},
+    {411.7, 3.761, 0.0783},    {426.2, 3.651, 0.02808}, {454.2, 3.498, 0.01585},
+    {501.3, 3.34, 0.006777},   {565.8, 3.21, 0.002445}, {667.2, 3.095, 0.0006402},
+    {826.8, 3.003, 0.0001257},
+};
+
+constexpr MetalSample kAluminiumAntimonide[] = {
+    {364.7, 3.97, 2.64},  {375.7, 4.14, 2.69},   {387.5, 4.51, 2.47}, {399.9, 4.57, 2.12},
+    {413.3, 4.52, 1.97},  {427.5, 4.66, 2.06},   {442.8, 5.27, 1.58}, {459.2, 5.08, 0.92},
+    {476.9, 4.81, 0.63},  {495.9, 4.61, 0.46},   {516.6, 4.44, 0.33}, {539.1, 4.31, 0.24},
+    {563.6, 4.2, 0.01},   {590.4, 4.01, 0.006},  {619.9, 3.9, 0.004}, {688.8, 3.73, 0.002},
+    {774.9, 3.6, 0.0003}, {826.6, 3.54, 0.0002},
+};
+
+constexpr MetalSample kBeryllium[] = {
+    {355.7, 2.637, 3.147}, {397.4, 2.868, 3.139}, {456.6, 3.098, 3.126}, {524.5, 3.267, 3.127},
+    {602.6, 3.377, 3.161}, {711.7, 3.435, 3.261}, {840.6, 3.411, 3.454},
+};
+
+constexpr MetalSample kCaesiumIodide[] = {
+    {360, 1.822, 0}, {440, 1.774, 0}, {540, 1.744, 0}, {780, 1.729, 0}, {820, 1.731, 0},
+};
+
+constexpr MetalSample kDiamond[] = {
+    {364.7, 2.473, 0},
+    {476.9, 2.431, 0},
+    {688.8, 2.407, 0},
+    {885.6, 2.4, 0},
+};
+
+constexpr MetalSample kMercury[] = {
+    {364.7, 0.713, 3.074}, {413.3, 0.898, 3.538}, {476.9, 1.186, 4.09},  {563.6, 1.621, 4.75},
+    {619.9, 1.91, 5.15},   {688.8, 2.284, 5.582}, {774.9, 2.746, 6.054}, {885.6, 3.324, 6.557},
+};
+
+constexpr MetalSample kIridium[] = {
+    {358.5, 1.847, 3.652}, {398.1, 1.99, 3.993},  {497.1, 2.375, 4.753}, {566.5, 2.712, 5.213},
+    {645.7, 3.055, 5.606}, {754.7, 3.362, 6.082}, {824, 3.502, 6.405},
+};
+
+constexpr MetalSample kPotassium[] = {
+    {365, 0.05189, 0.5493},  {404.6, 0.04067, 0.7992}, {440, 0.04262, 1.021},
+    {505, 0.04569, 1.28},    {545.9, 0.04921, 1.433},  {662, 0.05002, 1.839},
+    {750.1, 0.04422, 2.194}, {859.8, 0.04008, 2.558},
+};
+
+constexpr MetalSample kLithium[] = {
+    {364.7, 0.304, 1.579},  {393.6, 0.2697, 1.724}, {400, 0.2626, 1.752},   {413.3, 0.2455, 1.833},
+    {420.3, 0.2367, 1.859}, {427.5, 0.2276, 1.911}, {435, 0.2221, 1.936},   {467.9, 0.1902, 2.13},
+    {476.9, 0.1839, 2.176}, {486.2, 0.1739, 2.243}, {495.9, 0.1684, 2.287}, {527.6, 0.1495, 2.474},
+    {551, 0.1436, 2.612},   {576.7, 0.1459, 2.742}, {590.4, 0.1465, 2.832}, {619.9, 0.149, 2.987},
+    {799.9, 0.1793, 4.016}, {826.6, 0.1837, 4.163},
+};
+
+constexpr MetalSample kMagnesiumOxide[] = {
+    {361.7, 1.764, 5.103e-06},
+    {534, 1.733, 5.153e-06},
+    {836.7, 1.718, 5.196e-06},
+};
+
+constexpr MetalSample kMolybdenum[] = {
+    {365, 2.65, 3.5},  {404, 2.66, 3.41}, {425, 2.71, 3.41}, {450, 2.84, 3.51},
+    {475, 2.95, 3.64}, {500, 3.15, 3.73}, {525, 3.22, 3.74}, {550, 3.47, 3.56},
+    {600, 3.38, 3.56}, {675, 3.47, 3.74}, {700, 3.48, 3.7},  {725, 3.5, 3.8},
+    {750, 3.52, 3.65}, {775, 3.47, 3.57}, {800, 3.46, 3.65}, {850, 3.29, 3.58},
+};
+
+constexpr MetalSample kSodium[] = {
+    {365, 0.06108, 1.326},   {387, 0.06512, 1.474}, {404.6, 0.06896, 1.537},
+    {440, 0.0683, 1.757},    {470, 0.06615, 1.882}, {505, 0.06285, 2.069},
+    {545.9, 0.05865, 2.234}, {662, 0.04853, 2.761}, {750.1, 0.04955, 3.219},
+    {859.8, 0.05303, 3.725},
+};
+
+constexpr MetalSample kNiobium[] = {
+    {364.3, 2.544, 2.413}, {405, 2.528, 2.634},   {425.2, 2.559, 2.736}, {466.1, 2.692, 2.861},
+    {488.2, 2.768, 2.891}, {517.8, 2.856, 2.894}, {553.2, 2.925, 2.869}, {576.2, 2.932, 2.86},
+    {639.1, 2.879, 2.843}, {676, 2.811, 2.856},   {702.9, 2.7, 2.93},    {777.9, 2.478, 3.081},
+    {798.8, 2.338, 3.237}, {842, 2.207, 3.379},
+};
+
+constexpr MetalSample kNickel[] = {
+    {354, 1.74, 2.32}, {368, 1.7, 2.4},   {381, 1.72, 2.48}, {397, 1.72, 2.57}, {413, 1.7, 2.69},
+    {451, 1.73, 2.95}, {471, 1.78, 3.09}, {521, 1.85, 3.42}, {549, 1.92, 3.61}, {617, 1.99, 4.02},
+    {659, 1.99, 4.26}, {704, 2.06, 4.5},  {756, 2.13, 4.73}, {821, 2.26, 4.97},
+};
+
+constexpr MetalSample kRhodium[] = {
+    {364.7, 1.11, 3.84}, {387.5, 1.3, 4.09},  {413.3, 1.53, 4.29}, {427.5, 1.63, 4.36},
+    {459.2, 1.8, 4.49},  {476.9, 1.85, 4.55}, {516.6, 1.9, 4.78},  {619.9, 2.12, 5.51},
+    {729.3, 2.42, 6.33}, {826.6, 2.78, 6.97},
+};
+
+constexpr MetalSample kTitaniumCarbide[] = {
+    {354.2, 2.57, 2.34}, {413.3, 2.78, 2.43}, {495.9, 2.95, 2.38},
+    {619.9, 3.05, 2.67}, {826.6, 3.51, 3.07},
+};
+
+constexpr MetalSample kTitaniumNitride[] = {
+    {354.2, 2.14, 1.06}, {413.3, 1.74, 1.04}, {495.9, 1.2, 1.65},
+    {619.9, 1.32, 2.69}, {826.6, 1.82, 3.81},
+};
+
+constexpr MetalSample kTitaniumDioxide[] = {
+    {362.9, 2.897, 0.02183},  {380, 2.773, 0.003973},  {404.9, 2.664, 0.0004268},
+    {446.5, 2.558, 1.77e-05}, {512.7, 2.468, 3.3e-07}, {623.5, 2.393, 2.84e-09},
+    {821.9, 2.337, 0},
+};
+
+constexpr MetalSample kVanadium[] = {
+    {354, 2.51, 3.34}, {368, 2.68, 3.4},  {381, 2.87, 3.45}, {397, 3.07, 3.48}, {413, 3.31, 3.49},
+    {431, 3.52, 3.49}, {451, 3.59, 3.46}, {471, 3.81, 3.38}, {496, 3.92, 3.26}, {521, 3.86, 3.18},
+    {549, 4, 3.04},    {582, 3.83, 3},    {617, 3.54, 3.02}, {659, 3.25, 3.09}, {704, 3.18, 3.15},
+    {756, 3.2, 3.2},   {821, 3.16, 3.25},
+};
+
+constexpr MetalSample kVanadiumCarbide[] = {
+    {354.2, 2.59, 2.12}, {413.3, 2.77, 2.16}, {495.9, 2.84, 2.21},
+    {619.9, 3.01, 2.51}, {826.6, 3.37, 2.88},
+};
+
+constexpr MetalSample kVanadiumNitride[] = {
+    {354.2, 2.18, 1.58}, {413.3, 2.13, 1.7},  {495.9, 2.17, 1.98},
+    {619.9, 2.35, 2.47}, {826.6, 2.73, 2.92},
+};
+
 constexpr std::string_view kJohnsonChristy = "Johnson and Christy, Phys. Rev. B 6, 4370 (1972)";
+constexpr std::string_view kJohnsonChristyTransition =
+    "Johnson and Christy, Phys. Rev. B 9, 5056 (1974)";
+constexpr std::string_view kPfluger = "Pflueger et al., Phys. Rev. B 30, 1155 (1984)";
 constexpr std::string_view kRakic = "Rakic, Appl. Opt. 34, 4755 (1995)";
 constexpr std::string_view kRakicModel =
     "Rakic et al., Appl. Opt. 37, 5271 (1998), Brendel-Bormann model";
-constexpr std::string_view kWeaver = "Weaver, Olson and Lynch, Phys. Rev. B 12, 1293 (1975)";
+constexpr std::string_view kSmith = "Smith, Phys. Rev. 183, 634 (1969)";
 
 constexpr std::pair<std::string_view, Metal> kMetals[] = {
-    {"Ag", {kJohnsonChristy, kSilver}}, {"Al", {kRakic, kAluminium}},
-    {"Au", {kJohnsonChristy, kGold}},   {"Cr", {kRakicModel, kChromium}},
-    {"Cu", {kJohnsonChristy, kCopper}}, {"W", {kWeaver, kTungsten}},
+    {"a-C", {"Arakawa, Williams and Inagaki, J. Appl. Phys. 48, 3176 (1977)", kAmorphousCarbon}},
+    {"Ag", {kJohnsonChristy, kSilver}},
+    {"Al", {kRakic, kAluminium}},
+    {"AlAs", {"Rakic and Majewski, J. Appl. Phys. 80, 5909 (1996)", kAluminiumArsenide}},
+    {"AlSb", {"Zollner et al., J. Appl. Phys. 66, 383 (1989)", kAluminiumAntimonide}},
+    {"Au", {kJohnsonChristy, kGold}},
+    {"Be", {kRakicModel, kBeryllium}},
+    {"Cr", {kRakicModel, kChromium}},
+    {"CsI", {"Querry, report CRDEC-CR-88009 (1987)", kCaesiumIodide}},
+    {"Cu", {kJohnsonChristy, kCopper}},
+    {"d-C", {"Phillip and Taft, Phys. Rev. 136, A1445 (1964)", kDiamond}},
+    {"Hg", {"Inagaki, Arakawa and Williams, Phys. Rev. B 23, 5246 (1981)", kMercury}},
+    {"Ir", {"Schmitt et al., Opt. Mater. Express 12, 545 (2022)", kIridium}},
+    {"K", {kSmith, kPotassium}},
+    {"Li", {"Mathewson and Myers, Phys. Scr. 4, 291 (1971)", kLithium}},
+    {"MgO", {"Synowicki and Tiwald, Thin Solid Films 455, 248 (2004)", kMagnesiumOxide}},
+    {"Mo", {"Kirillova et al., Sov. Phys. JETP 33, 1210 (1971)", kMolybdenum}},
+    {"Na", {kSmith, kSodium}},
+    {"Nb", {"Weaver, Lynch and Olson, Phys. Rev. B 7, 4311 (1973)", kNiobium}},
+    {"Ni", {kJohnsonChristyTransition, kNickel}},
+    {"Rh", {"Weaver, Olson and Lynch, Phys. Rev. B 15, 4115 (1977)", kRhodium}},
+    {"TiC", {kPfluger, kTitaniumCarbide}},
+    {"TiN", {kPfluger, kTitaniumNitride}},
+    {"TiO2", {"Siefke et al., Adv. Opt. Mater. 4, 1780 (2016)", kTitaniumDioxide}},
+    {"V", {kJohnsonChristyTransition, kVanadium}},
+    {"VC", {kPfluger, kVanadiumCarbide}},
+    {"VN", {kPfluger, kVanadiumNitride}},
+    {"W", {"Weaver, Olson and Lynch, Phys. Rev. B 12, 1293 (1975)", kTungsten}},
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Measured optical constants of metals.
+/// Measured optical constants of metals, and of what else Mitsuba counts among them.
 #pragma once
 
 #include <span>
@@ -19,7 +19,7 @@ struct Metal {
   std::span<const MetalSample> samples;
 };
 
-/// By chemical symbol; tabulated over the whole visible range.
+/// By the name that Mitsuba gives them; tabulated over the whole visible range.
 std::span<const std::pair<std::string_view, Metal>> metals();
 
 }  // namespace driftlight

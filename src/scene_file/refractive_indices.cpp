@@ -52,7 +52,12 @@ double read_index(Properties& properties, std::string_view name, std::string_vie
 }
 
 MetalIndex find_metal(Properties& properties, const std::string& name) {
-  const Metal& metal = find_substance(properties, "material", name, metals());
+  // Mitsuba names some after their source too, and has some from two.
+  constexpr std::string_view kSource = "_palik";
+  const bool sourced = lower_case(name).ends_with(kSource);
+  const Metal& metal =
+      find_substance(properties, "material",
+                     sourced ? name.substr(0, name.size() - kSource.size()) : name, metals());
   return {to_rgb(metal.samples, &MetalSample::eta), to_rgb(metal.samples, &MetalSample::k),
           std::string(metal.source)};
 }
