@@ -262,9 +262,9 @@ TEST(Redistribution, ChoosesAHighThresholdForChainsThatStay) {
 }
 
 /// Where all light comes through an opening samples are noisy though few are bright, and
-/// perturbations keep to it.
+/// perturbations keep to it; they have to spread over many pixels to be worth it.
 TEST(Redistribution, PerturbsChainsThroughAnOpening) {
-  const LoadedScene loaded = load_small("small_hole");
+  const LoadedScene loaded = load_small("small_hole", {{"width", "128"}, {"height", "96"}});
   const LangevinStatistics chosen =
       render_small(loaded.scene, 2, std::nullopt, std::nullopt).statistics;
   EXPECT_EQ(chosen.perturbations, 1.0);
@@ -275,6 +275,26 @@ TEST(Redistribution, PerturbsChainsThroughAnOpening) {
 TEST(Redistribution, PerturbationsNeedAPinhole) {
   EXPECT_THROW(render_small(lens(false), 2, 1.0, 0.5), InputError);
   EXPECT_EQ(render_small(lens(false), 2, std::nullopt, std::nullopt).statistics.perturbations, 0.0);
+}
+
+// Law: without levels, chains and what a pilot learns about light it is bidirectional path tracing,
+// bit for bit.
+TEST(Redistribution, AloneIsBidirectionalPathTracing) {
+  const LoadedScene loaded = load_small("cornell_glossy");
+  LangevinOptions options;
+  options.mode = Mode::Splitting;
+  options.max_depth = 5;
+  options.splitting.levels = 0;
+  options.redistribution = {.threshold = 1e9,
+                            .mutations_per_sample = 1,
+                            .perturbations = 0,
+                            .guide = false,
+                            .pilot = 1024,
+                            .light_subpaths = 1};
+  RenderOptions render;
+  render.seed = 5;
+  EXPECT_EQ(render_langevin(loaded.scene, options, render, 4).image.rgb,
+            render_bdpt(loaded.scene, BdptOptions{.max_depth = 5}, render, 4).image.rgb);
 }
 
 /// What no sample exceeds is carried by the samples alone.

@@ -18,7 +18,7 @@ constexpr int kTile = 8;
 LoadedScene load_small(const std::string& name, const std::map<std::string, std::string>& defines) {
   LoadOptions options;
   options.defines = {{"width", "32"}, {"height", "24"}};
-  options.defines.insert(defines.begin(), defines.end());
+  for (const auto& [define, value] : defines) options.defines[define] = value;
   return load_scene(own_scene(name), options);
 }
 
