@@ -6,6 +6,7 @@
 #include "driftlight/constraints.h"
 #include "driftlight/contribution.h"
 #include "driftlight/linearization.h"
+#include "jacobian_rows.h"
 #include "visitor_pair.h"
 
 namespace driftlight {
@@ -63,37 +64,11 @@ class DisplacedBlocks {
   int first_;
 };
 
-/// Rows sqrt(w) dr of all residuals, a pass of N columns at a time.
-class JacobianRows {
- public:
-  void begin_pass(int first) {
-    first_ = first;
-    count_ = 0;
-  }
-  template <int N>
-  void add(const ceres::Jet<double, N>& residual, double precision) {
-    rows_.row(count_++).template segment<N>(first_) = std::sqrt(precision) * residual.v.transpose();
-  }
-
-  /// Q = 1/9 R^T R + floor, computed in W >= d columns so that all loops have fixed bounds.
-  template <int W>
-  void accumulate(int d, Matrix& q) const {
-    Eigen::Matrix<double, W, W, Eigen::RowMajor> sum;
-    sum.setZero();
-    for (int i = 0; i < count_; ++i) {
-      const auto row = rows_.row(i).template head<W>();
-      sum.noalias() += row.transpose() * row;
-    }
-    q = (1.0 / 9.0) * sum.topLeftCorner(d, d);
-    q.diagonal().array() += kConstraintFloor;
-  }
-
- private:
-  // Uninitialised: each pass writes its columns of every row that is read.
-  Eigen::Matrix<double, kMaxResiduals, kMaxDimension, Eigen::RowMajor> rows_;
-  int first_ = 0;
-  int count_ = 0;
-};
+/// Q = 1/9 sum_k w_k J_k^T J_k + floor
+void set_matrix(const JacobianRows& rows, int d, Matrix& q) {
+  rows.accumulate(d, q);
+  q.diagonal().array() += kConstraintFloor;
+}
 
 template <int N>
 void store_gradient(const ceres::Jet<double, N>& log_target, int first, Vector& gradient) {
@@ -123,17 +98,6 @@ void differentiate_pass(const Scene& scene, const PathTopology& topology, const 
   }
 }
 
-void accumulate(const JacobianRows& rows, int d, Matrix& q) {
-  if (d <= 4)
-    rows.accumulate<4>(d, q);
-  else if (d <= 8)
-    rows.accumulate<8>(d, q);
-  else if (d <= 16)
-    rows.accumulate<16>(d, q);
-  else
-    rows.accumulate<kMaxDimension>(d, q);
-}
-
 /// Calls pass(integral_constant<int, N>, first) for the passes that cover d coordinates.
 template <class Pass>
 void for_each_pass(int d, const Pass& pass) {
@@ -161,7 +125,7 @@ void differentiate(const Scene& scene, const PathTopology& topology, const Chart
   for_each_pass(d, [&](auto width, int first) {
     differentiate_pass<width()>(scene, topology, chart, request, first, rows, result.gradient);
   });
-  if (request.constraints) accumulate(rows, d, result.q);
+  if (request.constraints) set_matrix(rows, d, result.q);
 }
 
 void constraint_matrix(const Scene& scene, const PathTopology& topology, const Chart& chart,
@@ -175,7 +139,7 @@ void constraint_matrix(const Scene& scene, const PathTopology& topology, const C
     ConstraintVisitor<T, JacobianRows> visitor(rows);
     walk<T>(scene, topology, blocks, visitor);
   });
-  accumulate(rows, d, q);
+  set_matrix(rows, d, q);
 }
 
 }  // namespace driftlight

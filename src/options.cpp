@@ -8,6 +8,7 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <system_error>
 
 #include "driftlight/error.h"
@@ -77,13 +78,17 @@ OptionEntry number_or_auto(std::string_view name, std::optional<T>& field, const
           }};
 }
 
-/// `words[i]` names the enumerator of value i.
+/// `words[i]` names the enumerator of value i; those without a word are not valid.
 template <class Enum, std::size_t N>
 OptionEntry choice(std::string_view name, Enum& field, const std::array<std::string_view, N>& words,
                    std::string_view help) {
   const std::string values = fmt::format("{}", fmt::join(words, "|"));
   return {name, values, help,
-          [&field, words] { return std::string(words.at(static_cast<std::size_t>(field))); },
+          [&field, name, words, values] {
+            const auto index = static_cast<std::size_t>(field);
+            if (index >= N) fail(name, std::to_string(index), values);
+            return std::string(words.at(index));
+          },
           [&field, name, words, values](const std::string& text) {
             const auto* word = std::find(words.begin(), words.end(), text);
             if (word == words.end()) fail(name, text, values);
@@ -111,9 +116,104 @@ OptionEntry bootstrap(int& field) {
                 "samples that find the mean brightness and start the chains");
 }
 
+OptionEntry target_acceptance(double& field) {
+  return number(
+      "target_acceptance", field, Range<double>{0, 1},
+      "a pilot tunes the scale until so many small steps are accepted; 0: it is as given");
+}
+
 /// Every value must survive its own text form, which `set` checks.
 void check(const std::vector<OptionEntry>& entries) {
   for (const OptionEntry& entry : entries) entry.set(entry.get());
+}
+
+void append(std::vector<OptionEntry>& to, const std::vector<OptionEntry>& more) {
+  to.insert(to.end(), more.begin(), more.end());
+}
+
+/// The same options, which do nothing unless the setting `text` is made.
+std::vector<OptionEntry> only_with(std::string_view text, const std::function<bool()>& holds,
+                                   std::vector<OptionEntry> entries) {
+  for (OptionEntry& entry : entries)
+    if (!entry.condition) entry.condition = {text, holds};
+  return entries;
+}
+
+/// Of a second step after one that is rejected; `scale` is the help of its size.
+std::vector<OptionEntry> delayed_rejection_entries(bool& delayed_rejection, double& second_scale,
+                                                   const Range<double>& range,
+                                                   std::string_view scale) {
+  std::vector<OptionEntry> result{
+      choice("delayed_rejection", delayed_rejection, std::array<std::string_view, 2>{"off", "on"},
+             "a rejected small step is followed by a second, smaller one")};
+  append(result,
+         only_with("delayed_rejection=on", [&delayed_rejection] { return delayed_rejection; },
+                   {number("second_scale", second_scale, range, scale)}));
+  return result;
+}
+
+std::vector<OptionEntry> chain_entries(LangevinOptions& options) {
+  std::vector<OptionEntry> result{
+      number_or_auto("large_step_probability", options.large_step_probability, Range<double>{0, 1},
+                     "probability of an independent proposal; auto: from the bootstrap"),
+      choice("large_steps", options.large_steps, std::array<std::string_view, 2>{"path", "bdpt"},
+             "where independent proposals come from: the sensor, or both ends")};
+  append(result, delayed_rejection_entries(options.delayed_rejection, options.second_scale,
+                                           Range<double>{.low = 0, .open = true},
+                                           "scale of that second step, over that of the first"));
+  append(result, {target_acceptance(options.target_acceptance), direct(options.direct),
+                  chains(options.chains), bootstrap(options.bootstrap)});
+  return result;
+}
+
+std::vector<OptionEntry> redistribution_entries(RedistributionOptions& options) {
+  const Range<double> positive{.low = 0, .open = true};
+  return {
+      number_or_auto("threshold", options.threshold, positive,
+                     "samples keep so many times the local brightness; auto: from a pilot"),
+      number("chain_length", options.chain_length, Range<int>{1, 1000000}, "mutations of a chain"),
+      number_or_auto("mutations_per_sample", options.mutations_per_sample, positive,
+                     "most mutations for each sample, in the mean; auto: from a pilot"),
+      number_or_auto("perturbations", options.perturbations, Range<double>{0, 1},
+                     "share of the starts whose chains move by the perturbations of mlt; auto: "
+                     "from a pilot"),
+      choice("guide", options.guide, std::array<std::string_view, 2>{"off", "on"},
+             "light subpaths start where a pilot has found that light comes from"),
+      number_or_auto("light_subpaths", options.light_subpaths, Range<double>{0, 1, true},
+                     "light subpaths for each sample, in the mean; auto: from a pilot"),
+      number("pilot", options.pilot, Range<int>{256, 1000000000},
+             "samples of the pilot's last round"),
+  };
+}
+
+std::vector<OptionEntry> splitting_entries(SplittingOptions& options) {
+  return {
+      choice("split", options.all, std::array<std::string_view, 2>{"auto", "all"},
+             "particles carry what a pilot finds them better for, or all that samples leave"),
+      number_or_auto("levels", options.levels, Range<int>{0, 32},
+                     "softer versions of the scene; 0: none, auto: as it needs"),
+      number_or_auto("level_steps", options.steps, Range<int>{0, 1000000},
+                     "steps of a particle at each softer level; auto: 4, or 16 where narrow lobes "
+                     "are softened"),
+      number("level_trust", options.trust, Range<double>{.low = 0, .open = true},
+             "trust of the steps of particles"),
+      number("last_steps", options.last_steps, Range<int>{1, 1000000},
+             "steps of a particle in the scene itself"),
+      number("splitting_pilot", options.pilot, Range<int>{64, 1000000000},
+             "samples of each round of the pilot that finds what particles are worth"),
+  };
+}
+
+/// The sizes of a Langevin step; `trust` is the help of that option.
+std::vector<OptionEntry> step_size_entries(KernelOptions& kernel, std::string_view trust) {
+  const Range<double> positive{.low = 0, .open = true};
+  return {number("epsilon", kernel.epsilon, positive, "bound of dt |(a, grad U)|"),
+          number("safety", kernel.safety, positive, "divisor of the time step"),
+          number("time_step_cap", kernel.time_step_cap, positive, "largest time step"),
+          number("scale", kernel.scale, positive, "factor on the step matrix T"),
+          number("scale_decades", kernel.scale_decades, Range<double>{0, 10},
+                 "decades over which each step draws its scale; 0: fixed"),
+          number("trust", kernel.trust, positive, trust)};
 }
 
 }  // namespace
@@ -123,11 +223,8 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
   constexpr std::array<std::string_view, 4> kPreconditioners{"identity", "diagonal", "constraints",
                                                              "hessian"};
   constexpr std::array<std::string_view, 2> kMethods{"jet", "hand"};
-  const Range<double> positive{.low = 0, .open = true};
   KernelOptions& kernel = options.kernel;
-  RedistributionOptions& redistribution = options.redistribution;
-  SplittingOptions& splitting = options.splitting;
-  return {
+  std::vector<OptionEntry> result{
       choice(
           "mode", options.mode,
           std::array<std::string_view, 3>{"chain", "redistribution", "splitting"},
@@ -144,59 +241,22 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
              "automatic or hand-derived derivatives; the same to rounding"),
       choice("aperture", kernel.aperture, std::array<std::string_view, 2>{"off", "on"},
              "constraints feel the edges of holes and gaps, by probe rays about each segment"),
-      number("epsilon", kernel.epsilon, positive, "bound of dt |(a, grad U)|"),
-      number("safety", kernel.safety, positive, "divisor of the time step"),
-      number("time_step_cap", kernel.time_step_cap, positive, "largest time step"),
-      number("scale", kernel.scale, positive, "factor on the step matrix T"),
-      number("scale_decades", kernel.scale_decades, Range<double>{0, 10},
-             "decades over which each step draws its scale; 0: fixed"),
-      number("trust", kernel.trust, positive,
-             "radius, in radians, beyond which a step is not to go where constraints allow it"),
-      number_or_auto("large_step_probability", options.large_step_probability, Range<double>{0, 1},
-                     "probability of an independent proposal; auto: from the bootstrap"),
-      choice("large_steps", options.large_steps, std::array<std::string_view, 2>{"path", "bdpt"},
-             "where independent proposals come from: the sensor, or both ends"),
-      choice("delayed_rejection", options.delayed_rejection,
-             std::array<std::string_view, 2>{"off", "on"},
-             "chain: a rejected small step is followed by a second, smaller one"),
-      number("second_scale", options.second_scale, positive,
-             "chain: scale of that second step, over that of the first"),
-      direct(options.direct),
-      number_or_auto("threshold", redistribution.threshold, positive,
-                     "redistribution: samples keep so many times the local brightness; auto: from "
-                     "a pilot"),
-      number("chain_length", redistribution.chain_length, Range<int>{1, 1000000},
-             "redistribution: mutations of a chain"),
-      number_or_auto("mutations_per_sample", redistribution.mutations_per_sample, positive,
-                     "redistribution: most mutations for each sample, in the mean; auto: from a "
-                     "pilot"),
-      number_or_auto("perturbations", redistribution.perturbations, Range<double>{0, 1},
-                     "redistribution: share of the starts whose chains move by the perturbations "
-                     "of mlt; auto: from a pilot"),
-      choice("guide", redistribution.guide, std::array<std::string_view, 2>{"off", "on"},
-             "redistribution: light subpaths start where a pilot has found that light comes from"),
-      number_or_auto("light_subpaths", redistribution.light_subpaths, Range<double>{0, 1, true},
-                     "redistribution: light subpaths for each sample, in the mean; auto: from a "
-                     "pilot"),
-      number("pilot", redistribution.pilot, Range<int>{256, 1000000000},
-             "redistribution: samples of the pilot's last round"),
-      choice("split", splitting.all, std::array<std::string_view, 2>{"auto", "all"},
-             "splitting: carries what a pilot finds it better for, or all that samples leave"),
-      number_or_auto("levels", splitting.levels, Range<int>{0, 32},
-                     "splitting: softer versions of the scene; 0: none, auto: as it needs"),
-      number_or_auto("level_steps", splitting.steps, Range<int>{0, 1000000},
-                     "splitting: steps of a particle at each softer level; auto: 4, or 16 where "
-                     "narrow lobes are softened"),
-      number("level_trust", splitting.trust, positive,
-             "splitting: trust of the steps of particles"),
-      number("last_steps", splitting.last_steps, Range<int>{1, 1000000},
-             "splitting: steps of a particle in the scene itself"),
-      number("splitting_pilot", splitting.pilot, Range<int>{64, 1000000000},
-             "splitting: samples of each round of its pilot"),
-      chains(options.chains),
-      bootstrap(options.bootstrap),
-      max_depth(options.max_depth),
   };
+  append(result, step_size_entries(kernel,
+                                   "radius, in radians, beyond which a step is not to go where "
+                                   "constraints allow it"));
+  append(result, only_with(
+                     "mode=chain", [&options] { return options.mode == Mode::Chain; },
+                     chain_entries(options)));
+  append(result,
+         only_with(
+             "mode=redistribution or splitting", [&options] { return options.mode != Mode::Chain; },
+             redistribution_entries(options.redistribution)));
+  append(result, only_with(
+                     "mode=splitting", [&options] { return options.mode == Mode::Splitting; },
+                     splitting_entries(options.splitting)));
+  result.push_back(max_depth(options.max_depth));
+  return result;
 }
 
 std::vector<OptionEntry> entries(PathOptions& options) { return {max_depth(options.max_depth)}; }
@@ -228,15 +288,14 @@ std::vector<OptionEntry> entries(PrimaryOptions& options) {
 
 std::vector<OptionEntry> entries(MmltOptions& options) {
   std::vector<OptionEntry> result = entries(static_cast<PrimaryOptions&>(options));
-  const std::vector<OptionEntry> more{
+  std::vector<OptionEntry> more{
       choice("large_steps", options.large_steps, std::array<std::string_view, 2>{"one", "all"},
              "proposals drawn anew: of one strategy, or a whole bidirectional sample, of "
-             "which one path goes on"),
-      choice("delayed_rejection", options.delayed_rejection,
-             std::array<std::string_view, 2>{"off", "on"},
-             "a rejected small step is followed by a second, smaller one"),
-      number("second_scale", options.second_scale, Range<double>{.low = 0, .high = 1, .open = true},
-             "scale of that second step, over that of steps from step_min to step_max")};
+             "which one path goes on")};
+  append(more, delayed_rejection_entries(
+                   options.delayed_rejection, options.second_scale,
+                   Range<double>{.low = 0, .high = 1, .open = true},
+                   "scale of that second step, over that of steps from step_min to step_max"));
   result.insert(result.begin() + 1, more.begin(), more.end());
   return result;
 }
@@ -283,6 +342,25 @@ std::vector<OptionEntry> entries(LmcOptions& options) {
        number("cache", options.cache, Range<int>{0, 1000000},
               "points of a strategy at which a pilot remembers gradients for all steps; 0: chains "
               "do, as they go")});
+}
+
+std::vector<OptionEntry> entries(MalaOptions& options) {
+  KernelOptions& kernel = options.kernel;
+  std::vector<OptionEntry> result = gaussian_step_entries(
+      options,
+      {choice("drift", kernel.drift, std::array<std::string_view, 2>{"none", "gradient"},
+              "drift of a small step: Brownian, or -T T* grad U"),
+       choice("preconditioner", kernel.preconditioner,
+              std::array<std::string_view, 3>{"identity", "diagonal", "constraints"},
+              "step matrix: the same in all numbers, or from the diagonal or the whole matrix of "
+              "the path's constraints")});
+  const std::vector<OptionEntry> sizes = step_size_entries(
+      kernel,
+      "radius, in halves of a number's range, beyond which a step is not to go where "
+      "constraints allow it");
+  result.insert(result.begin() + 7, sizes.begin(), sizes.end());
+  result.insert(result.begin() + 7, target_acceptance(options.target_acceptance));
+  return result;
 }
 
 namespace {
@@ -375,6 +453,12 @@ void LmcOptions::validate() const {
   check(entries(copy));
 }
 
+void MalaOptions::validate() const {
+  PrimaryOptions::validate();
+  MalaOptions copy = *this;
+  check(entries(copy));
+}
+
 void MltOptions::validate() const {
   MltOptions copy = *this;
   check(entries(copy));
@@ -396,6 +480,13 @@ void set_option(const std::vector<OptionEntry>& entries, const std::string& name
   }
   throw OptionError(
       fmt::format("unknown option '{}'; the options are {}", name, fmt::join(names, ", ")));
+}
+
+void check_condition(const std::vector<OptionEntry>& entries, const std::string& name) {
+  for (const OptionEntry& entry : entries)
+    if (entry.name == name && entry.condition && !entry.condition->holds())
+      throw OptionError(
+          fmt::format("option {} does nothing without {}", name, entry.condition->text));
 }
 
 }  // namespace driftlight

@@ -14,15 +14,17 @@
 #include "chain_run.h"
 #include "driftlight/render.h"
 #include "primary_chain.h"
+#include "scale_tuning.h"
 #include "strategy_chain.h"
 #include "systematic_resampling.h"
 
 namespace driftlight {
 namespace {
 
-/// Mutations of the pilot of LMC's cache, for each of its points; and its share of the bootstrap.
+/// Mutations of the pilot of LMC's cache, for each of its points.
 constexpr double kCacheMutations = 64.0;
-constexpr int kCacheBootstrap = 8;
+/// Of pilots, one over the share of the bootstrap.
+constexpr int kPilotBootstrap = 8;
 
 /// Points of PrimaryTarget, and chains of them.
 class PointSampler {
@@ -202,7 +204,7 @@ std::shared_ptr<const GradientCache> run_cache_pilot(const Scene& scene,
                                                      int min_edges, const LmcOptions& options,
                                                      std::uint64_t seed) {
   LmcOptions online = options;
-  online.bootstrap = std::max(1, options.bootstrap / kCacheBootstrap);
+  online.bootstrap = std::max(1, options.bootstrap / kPilotBootstrap);
   const StrategyMethod method = online;
   Film unseen(scene.camera().film_width, scene.camera().film_height, scene.camera().filter);
   const PrimaryChains chains(NumbersSampler(target, method, nullptr), online, lengths, min_edges,
@@ -219,12 +221,24 @@ std::shared_ptr<const GradientCache> run_cache_pilot(const Scene& scene,
   return std::make_shared<const GradientCache>(all, options);
 }
 
+/// Tunes the scale of the steps of `method`, which has these options, by chains of a pilot.
+void run_scale_pilot(const Scene& scene, const StrategyTarget& target, Lengths lengths,
+                     int min_edges, const StrategyMethod& method, MalaOptions& options,
+                     std::uint64_t seed) {
+  PrimaryOptions fewer = options;
+  fewer.bootstrap = std::max(1, options.bootstrap / kPilotBootstrap);
+  Film unseen(scene.camera().film_width, scene.camera().film_height, scene.camera().filter);
+  const PrimaryChains chains(NumbersSampler(target, method, nullptr), fewer, lengths, min_edges,
+                             ~seed, unseen);
+  if (!chains.all.empty()) tune_scale(options.target_acceptance, chains.all, options.kernel.scale);
+}
+
 template <class Options>
 LangevinResult render_by_strategies(const Scene& scene, const Options& options,
                                     const RenderOptions& render, double mutations_per_pixel) {
   options.validate();
   const EmissionGuide unguided(scene);
-  const StrategyMethod method = options;
+  StrategyMethod method = options;
   const Lengths lengths =
       options.large_steps == StrategyLargeSteps::One ? Lengths::Apart : Lengths::Together;
   return render_primary(scene, options, render, mutations_per_pixel, lengths, [&](int min_edges) {
@@ -233,6 +247,11 @@ LangevinResult render_by_strategies(const Scene& scene, const Options& options,
     if constexpr (std::is_same_v<Options, LmcOptions>) {
       if (options.cache > 0)
         cache = run_cache_pilot(scene, target, lengths, min_edges, options, render.seed);
+    }
+    if constexpr (std::is_same_v<Options, MalaOptions>) {
+      if (options.target_acceptance > 0.0)
+        run_scale_pilot(scene, target, lengths, min_edges, method, std::get<MalaOptions>(method),
+                        render.seed);
     }
     return NumbersSampler(target, method, std::move(cache));
   });
@@ -262,6 +281,11 @@ LangevinResult render_h2mc(const Scene& scene, const H2mcOptions& options,
 
 LangevinResult render_lmc(const Scene& scene, const LmcOptions& options,
                           const RenderOptions& render, double mutations_per_pixel) {
+  return render_by_strategies(scene, options, render, mutations_per_pixel);
+}
+
+LangevinResult render_mala(const Scene& scene, const MalaOptions& options,
+                           const RenderOptions& render, double mutations_per_pixel) {
   return render_by_strategies(scene, options, render, mutations_per_pixel);
 }
 

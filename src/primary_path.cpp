@@ -4,11 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 #include <utility>
 
 #include "density_visitor.h"
+#include "driftlight/constraints.h"
 #include "driftlight/contribution.h"
 #include "emission_warp.h"
+#include "jacobian_rows.h"
 #include "primary_sample.h"
 #include "visitor_pair.h"
 
@@ -100,26 +103,50 @@ class PrimaryBlocks {
 };
 
 template <Scalar T>
-struct PrimaryVisitor : VisitorPair<T, ContributionVisitor<T>, DensityVisitor<T>> {
-  using VisitorPair<T, ContributionVisitor<T>, DensityVisitor<T>>::VisitorPair;
+struct TargetVisitor : VisitorPair<T, ContributionVisitor<T>, DensityVisitor<T>> {
+  TargetVisitor(const Scene& scene, const EmissionGuide& guide, const PathTopology& topology)
+      : VisitorPair<T, ContributionVisitor<T>, DensityVisitor<T>>(
+            std::piecewise_construct, std::tuple<>(),
+            std::forward_as_tuple(scene, guide, topology)) {}
+  void vertex(int k) { this->second.vertex(k); }
+
+  /// log f - log sum_s p_s, after the walk. Emitters that are seen directly are left to the
+  /// strategy that hits them (strategy_weights.h).
+  T log_target(const Scene& scene, const PrimaryPath& path) const {
+    using std::log;
+    const auto densities = densities_by_light_vertices(
+        this->second, path.topology, scene.emitter_probability(path.topology.emitter));
+    T sum = densities[0];
+    const int edges = path.strategy.edges();
+    for (int s = 1; edges > 1 && s <= edges; ++s) sum += densities[static_cast<std::size_t>(s)];
+    return this->first.log_target() - log(sum);
+  }
+};
+
+/// The target with the constraints of the path, which `Sink` takes.
+template <Scalar T, class Sink>
+struct ConstrainedVisitor : VisitorPair<T, ConstraintVisitor<T, Sink>, TargetVisitor<T>> {
+  ConstrainedVisitor(Sink& sink, const Scene& scene, const EmissionGuide& guide,
+                     const PathTopology& topology)
+      : VisitorPair<T, ConstraintVisitor<T, Sink>, TargetVisitor<T>>(
+            std::piecewise_construct, std::forward_as_tuple(sink),
+            std::forward_as_tuple(scene, guide, topology)) {}
   void vertex(int k) { this->second.vertex(k); }
 };
 
-/// log f - log sum_s p_s. Emitters that are seen directly are left to the strategy that hits them
-/// (strategy_weights.h).
+template <Scalar T, class Steering, class Visitor>
+void walk_by_numbers(const Scene& scene, const StrategyNumbers& numbers, const PrimaryPath& path,
+                     const Steering& u, Visitor& visitor) {
+  const PrimaryBlocks<T, Steering> blocks(scene, numbers, path, u);
+  walk<T>(scene, path.topology, blocks, visitor);
+}
+
 template <Scalar T, class Steering>
 T log_target_of(const Scene& scene, const EmissionGuide& guide, const StrategyNumbers& numbers,
                 const PrimaryPath& path, const Steering& u) {
-  using std::log;
-  const PrimaryBlocks<T, Steering> blocks(scene, numbers, path, u);
-  PrimaryVisitor<T> visitor(std::in_place, scene, guide, path.topology);
-  walk<T>(scene, path.topology, blocks, visitor);
-  const auto densities = densities_by_light_vertices(
-      visitor.second, path.topology, scene.emitter_probability(path.topology.emitter));
-  T sum = densities[0];
-  const int edges = path.strategy.edges();
-  for (int s = 1; edges > 1 && s <= edges; ++s) sum += densities[static_cast<std::size_t>(s)];
-  return visitor.first.log_target() - log(sum);
+  TargetVisitor<T> visitor(scene, guide, path.topology);
+  walk_by_numbers<T>(scene, numbers, path, u, visitor);
+  return visitor.log_target(scene, path);
 }
 
 /// Which numbers matter: those of delta vertices and of positions that are fixed do not.
@@ -162,6 +189,36 @@ int column_of(const ActiveNumbers& active, int first, int i) {
   for (int c = 0; c < N && first + c < active.count; ++c)
     if (active[first + c] == i) return c;
   return -1;
+}
+
+constexpr int kPass = 8;
+using PassJet = ceres::Jet<double, kPass>;
+
+/// The numbers that steer a path as Jets by the active ones [first, first + kPass).
+class PassNumbers {
+ public:
+  PassNumbers(const StrategyNumbers& numbers, const Strategy& strategy, const ActiveNumbers& active,
+              int first)
+      : numbers_(numbers), strategy_(strategy), active_(active), first_(first) {}
+
+  PassJet operator()(int i) const {
+    PassJet x(numbers_.steering(strategy_, i));
+    const int column = column_of<kPass>(active_, first_, i);
+    if (column >= 0) x.v[column] = 1.0;
+    return x;
+  }
+
+ private:
+  const StrategyNumbers& numbers_;
+  const Strategy& strategy_;
+  const ActiveNumbers& active_;
+  int first_;
+};
+
+void store_gradient(const PassJet& log_target, const ActiveNumbers& active, int first,
+                    Vector& gradient) {
+  for (int c = 0; c < kPass && first + c < active.count; ++c)
+    gradient[active[first + c]] = log_target.v[c];
 }
 
 PathEnd end_of(const Emitter& emitter, int s) {
@@ -300,22 +357,48 @@ double PrimaryFunction::log_target(const StrategyNumbers& numbers, const Primary
 
 bool PrimaryFunction::gradient(const StrategyNumbers& numbers, const PrimaryPath& path,
                                PrimaryDerivatives& result) const {
-  constexpr int kPass = 8;
-  using T = ceres::Jet<double, kPass>;
   const ActiveNumbers active = active_numbers(scene_, numbers, path);
   result.gradient.setZero(numbers.dimension(path.strategy));
-  for (int first = 0; first < active.count; first += kPass) {
-    const auto u = [&](int i) {
-      T x(numbers.steering(path.strategy, i));
-      const int column = column_of<kPass>(active, first, i);
-      if (column >= 0) x.v[column] = 1.0;
-      return x;
-    };
-    const T y = log_target_of<T>(scene_, guide_, numbers, path, u);
-    for (int c = 0; c < kPass && first + c < active.count; ++c)
-      result.gradient[active[first + c]] = y.v[c];
-  }
+  for (int first = 0; first < active.count; first += kPass)
+    store_gradient(log_target_of<PassJet>(scene_, guide_, numbers, path,
+                                          PassNumbers(numbers, path.strategy, active, first)),
+                   active, first, result.gradient);
   return result.gradient.allFinite();
+}
+
+bool PrimaryFunction::gradient_and_constraints(const StrategyNumbers& numbers,
+                                               const PrimaryPath& path,
+                                               PrimaryDerivatives& result) const {
+  const ActiveNumbers active = active_numbers(scene_, numbers, path);
+  const int d = numbers.dimension(path.strategy);
+  result.gradient.setZero(d);
+  JacobianRows rows;
+  for (int first = 0; first < active.count; first += kPass) {
+    rows.begin_pass(first);
+    ConstrainedVisitor<PassJet, JacobianRows> visitor(rows, scene_, guide_, path.topology);
+    walk_by_numbers<PassJet>(scene_, numbers, path,
+                             PassNumbers(numbers, path.strategy, active, first), visitor);
+    store_gradient(visitor.second.log_target(scene_, path), active, first, result.gradient);
+  }
+  Matrix of_active;
+  rows.accumulate(active.count, of_active);
+  result.constraints.setZero(d, d);
+  for (int r = 0; r < active.count; ++r)
+    for (int c = 0; c < active.count; ++c)
+      result.constraints(active[r], active[c]) = of_active(r, c);
+  return result.gradient.allFinite() && result.constraints.allFinite();
+}
+
+std::vector<PrimaryFunction::Residual> PrimaryFunction::residuals(const StrategyNumbers& numbers,
+                                                                  const PrimaryPath& path) const {
+  struct Sink {
+    std::vector<Residual> all;
+    void add(double value, double precision) { all.push_back({value, precision}); }
+  } sink;
+  ConstraintVisitor<double, Sink> visitor(sink);
+  walk_by_numbers<double>(
+      scene_, numbers, path, [&](int i) { return numbers.steering(path.strategy, i); }, visitor);
+  return std::move(sink.all);
 }
 
 bool PrimaryFunction::gradient_and_hessian(const StrategyNumbers& numbers, const PrimaryPath& path,

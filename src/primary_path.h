@@ -20,6 +20,7 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <vector>
 
 #include "bidirectional_tracer.h"
 #include "driftlight/phase_space.h"
@@ -121,10 +122,13 @@ struct PrimaryPath {
 };
 PrimaryPath primary_path(const Scene& scene, const FoundPath& found);
 
-/// Derivatives of log I by the numbers that steer the path.
+/// Derivatives by the numbers that steer the path, as far as they were asked for.
 struct PrimaryDerivatives {
-  Vector gradient;
-  Matrix hessian;  ///< if it was asked for
+  Vector gradient;  ///< of log I
+  Matrix hessian;   ///< of log I
+  /// 1/9 sum_k w_k J_k^T J_k, J_k = d r_k / du, over the constraints of the path (constraints.h):
+  /// (E63.13) in primary space, without its floor.
+  Matrix constraints;
 };
 
 class PrimaryFunction {
@@ -139,6 +143,16 @@ class PrimaryFunction {
                 PrimaryDerivatives& result) const;
   bool gradient_and_hessian(const StrategyNumbers& numbers, const PrimaryPath& path,
                             PrimaryDerivatives& result) const;
+  bool gradient_and_constraints(const StrategyNumbers& numbers, const PrimaryPath& path,
+                                PrimaryDerivatives& result) const;
+
+  /// What a constraint says of the path, and its precision w.
+  struct Residual {
+    double value;
+    double precision;
+  };
+  /// Of all constraints, in the order of the walk.
+  std::vector<Residual> residuals(const StrategyNumbers& numbers, const PrimaryPath& path) const;
 
  private:
   const Scene& scene_;

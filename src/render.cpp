@@ -14,6 +14,7 @@
 #include "driftlight/error.h"
 #include "driftlight/film.h"
 #include "redistribution.h"
+#include "scale_tuning.h"
 
 namespace driftlight {
 
@@ -73,11 +74,21 @@ struct Chains {
     if (!(bootstrap_weights.sum > 0.0)) return;
     if (!options.large_step_probability)
       options.large_step_probability = std::clamp(bootstrap.effective_fraction(), 0.1, 0.9);
-    for (const PathSampler::Sample& start : bootstrap.resample(options.chains)) {
-      const auto index = static_cast<std::uint64_t>(all.size());
-      all.push_back(std::make_unique<Chain>(scene, *sampler, options, film, start,
-                                            Rng(render.seed, Stream::Chain, index), render.layers));
+    const std::vector<PathSampler::Sample> starts = bootstrap.resample(options.chains);
+    const auto start_all = [&](Film& on, std::uint64_t seed, StepLayers* layers) {
+      std::vector<std::unique_ptr<Chain>> chains;
+      for (const PathSampler::Sample& start : starts)
+        chains.push_back(std::make_unique<Chain>(
+            scene, *sampler, options, on, start,
+            Rng(seed, Stream::Chain, static_cast<std::uint64_t>(chains.size())), layers));
+      return chains;
+    };
+    if (options.target_acceptance > 0.0) {
+      Film unseen(scene.camera().film_width, scene.camera().film_height, scene.camera().filter);
+      tune_scale(options.target_acceptance, start_all(unseen, ~render.seed, nullptr),
+                 options.kernel.scale);
     }
+    all = start_all(film, render.seed, render.layers);
     if (!render.check_gradients) return;
     for (std::uint64_t i = 0; i < all.size(); ++i)
       probes.emplace_back(scene, options.kernel, render.seed, i);

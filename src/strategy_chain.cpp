@@ -3,14 +3,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <type_traits>
 
 namespace driftlight {
 namespace {
 
 double isotropic_probability(const StrategyMethod& method) {
-  if (std::holds_alternative<MmltOptions>(method)) return 1.0;
-  if (const auto* h2mc = std::get_if<H2mcOptions>(&method)) return h2mc->isotropic_probability;
-  return std::get<LmcOptions>(method).isotropic_probability;
+  return std::visit(
+      [](const auto& of) {
+        if constexpr (std::is_base_of_v<GaussianStepOptions, std::decay_t<decltype(of)>>)
+          return of.isotropic_probability;
+        else
+          return 1.0;
+      },
+      method);
 }
 
 /// Of a proposal with so much light, over that of the current point.
@@ -106,10 +113,10 @@ double StrategyChain::propose_second(double first_acceptance, bool isotropic) {
   double log_ghost = 0.0;
   if (!isotropic) {
     derive(proposed_);
-    log_there = step_at(proposed_).log_density(offset_);
+    log_there = log_density(proposed_, offset_);
     if (ghost_.path) {
       derive(ghost_);
-      log_ghost = step_at(ghost_).log_density(-offset_);
+      log_ghost = log_density(ghost_, -offset_);
     }
   }
   const double there = deposits_.proposed.target;
@@ -148,9 +155,7 @@ double StrategyChain::propose_isotropic() {
 
 double StrategyChain::propose_gaussian() {
   derive(current_);
-  const GaussianStep forward = step_at(current_);
-  offset_ = forward.sample(rng_);
-  log_density_ = forward.log_density(offset_);
+  std::tie(offset_, log_density_) = draw_offset();
   proposed_.numbers = current_.numbers;
   const Strategy& strategy = current_.strategy();
   proposed_.numbers.move_choices(strategy, options_, rng_);
@@ -161,7 +166,7 @@ double StrategyChain::propose_gaussian() {
   look(proposed_, strategy, deposits_.proposed);
   if (!proposed_.path) return 0.0;
   derive(proposed_);
-  const double log_ratio = step_at(proposed_).log_density(-offset_) - log_density_;
+  const double log_ratio = log_density(proposed_, -offset_) - log_density_;
   return std::exp(log_ratio) * ratio(deposits_.proposed.target, deposits_.current.target);
 }
 
@@ -211,10 +216,38 @@ void StrategyChain::derive(Point& point) {
                : GaussianStep::isotropic(d, h2mc->sigma);
     return;
   }
+  if (const auto* mala = std::get_if<MalaOptions>(&method_)) {
+    point.langevin = langevin_step(point, mala->kernel);
+    return;
+  }
   const bool finite = target_.function().gradient(point.numbers, *point.path, derivatives_);
   point.gradient.resize(0);
   if (finite)
     point.gradient = GradientMemory::bounded(derivatives_.gradient, std::get<LmcOptions>(method_));
+}
+
+/// Q = 1/9 sum_k w_k J_k^T J_k + (trust / 2)^-2 I: a number is on a circle of circumference 1, and
+/// half of it is to it what pi is to a direction in (E63.13).
+StepDistribution StrategyChain::langevin_step(const Point& point, const KernelOptions& kernel) {
+  const int d = point.numbers.dimension(point.strategy());
+  const bool constrained = kernel.preconditioner != PreconditionerKind::Identity;
+  const PrimaryFunction& function = target_.function();
+  const bool finite =
+      constrained ? function.gradient_and_constraints(point.numbers, *point.path, derivatives_)
+                  : function.gradient(point.numbers, *point.path, derivatives_);
+  Factor factor = IdentityFactor(d);
+  if (constrained) {
+    Matrix q = Matrix::Zero(d, d);
+    if (finite && kernel.preconditioner == PreconditionerKind::Constraints)
+      q = derivatives_.constraints;
+    else if (finite)
+      q.diagonal() = derivatives_.constraints.diagonal();
+    q.diagonal().array() += 4.0 / (kernel.trust * kernel.trust);
+    if (const auto cholesky = CholeskyFactor::of(q)) factor = *cholesky;
+  }
+  const Vector slope = -derivatives_.gradient;
+  const bool drifts = finite && kernel.drift != Drift::None;
+  return {kernel, d, factor, drifts ? &slope : nullptr, nullptr};
 }
 
 Vector StrategyChain::steering(const Point& point) const {
@@ -233,6 +266,23 @@ GaussianStep StrategyChain::step_at(const Point& point) const {
   return (memory != memories_.end() ? memory->second : GradientMemory())
       .moments(point.gradient, *lmc)
       .step(*lmc);
+}
+
+std::pair<Vector, double> StrategyChain::draw_offset() {
+  if (const auto* mala = std::get_if<MalaOptions>(&method_)) {
+    scale_ = draw_scale(mala->kernel, rng_);
+    const Vector offset = current_.langevin.sample(scale_, rng_);
+    return {offset, current_.langevin.log_density(offset, scale_)};
+  }
+  const GaussianStep step = step_at(current_);
+  const Vector offset = step.sample(rng_);
+  return {offset, step.log_density(offset)};
+}
+
+double StrategyChain::log_density(const Point& point, const Vector& offset) const {
+  if (std::holds_alternative<MalaOptions>(method_))
+    return point.langevin.log_density(offset, scale_);
+  return step_at(point).log_density(offset);
 }
 
 void StrategyChain::remember() {

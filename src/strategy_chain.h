@@ -7,6 +7,7 @@
 #include <utility>
 #include <variant>
 
+#include "driftlight/kernel.h"
 #include "driftlight/render.h"
 #include "driftlight/running_mean.h"
 #include "gaussian_step.h"
@@ -15,7 +16,7 @@
 
 namespace driftlight {
 
-using StrategyMethod = std::variant<MmltOptions, H2mcOptions, LmcOptions>;
+using StrategyMethod = std::variant<MmltOptions, H2mcOptions, LmcOptions, MalaOptions>;
 
 const MmltOptions& common_options(const StrategyMethod& method);
 
@@ -69,7 +70,8 @@ class StrategyChain {
     bool derived = false;             ///< the rest is known
     /// Of LMC; empty where it is not finite.
     Vector gradient;
-    GaussianStep step;  ///< of H2MC, or by the cache
+    GaussianStep step;          ///< of H2MC, or by the cache
+    StepDistribution langevin;  ///< of MALA
 
     const Strategy& strategy() const { return path->strategy; }
   };
@@ -88,8 +90,13 @@ class StrategyChain {
   /// Draws one path out of a sample of the point's numbers, whose light is then `sample_`.
   void draw(Point& point, PrimaryPlace& place);
   void derive(Point& point);
+  StepDistribution langevin_step(const Point& point, const KernelOptions& kernel);
   Vector steering(const Point& point) const;
   GaussianStep step_at(const Point& point) const;
+  /// The offset of a Gaussian step from the current point, and its log density.
+  std::pair<Vector, double> draw_offset();
+  /// Of that step, or of the last one of its scale, at a point.
+  double log_density(const Point& point, const Vector& offset) const;
   /// The chain stays at its point after a Gaussian step.
   void remember();
 
@@ -105,6 +112,7 @@ class StrategyChain {
   Point proposed_;
   Vector offset_;  ///< of the last Gaussian step, and its density
   double log_density_ = 0;
+  double scale_ = 1;       ///< of MALA's
   PrimaryOptions second_;  ///< sizes of second steps
   Point ghost_;
   PrimaryPlace ghost_place_;

@@ -2,6 +2,7 @@
 /// Two visitors in one walk. WalkVisitor<T> stands for none.
 #pragma once
 
+#include <tuple>
 #include <utility>
 
 #include "driftlight/walk.h"
@@ -16,10 +17,11 @@ struct VisitorPair : WalkVisitor<T> {
   Second second;
 
   explicit VisitorPair(First a = {}, Second b = {}) : first(std::move(a)), second(std::move(b)) {}
-  /// The second from these, where it is.
-  template <class... Arguments>
-  explicit VisitorPair(std::in_place_t, Arguments&&... arguments)
-      : second(std::forward<Arguments>(arguments)...) {}
+  /// Each from its arguments, where it is.
+  template <class... A, class... B>
+  VisitorPair(std::piecewise_construct_t, std::tuple<A...> a, std::tuple<B...> b)
+      : first(std::make_from_tuple<First>(std::move(a))),
+        second(std::make_from_tuple<Second>(std::move(b))) {}
 
   void lens(const Camera& camera, const Vec3<T>& p) {
     first.lens(camera, p);

@@ -106,8 +106,8 @@ const std::vector<Mistake> kRenderMistakes{
     {{"missing.xml"}, {"missing.xml"}},
     {{"broken.xml"}, {"broken.xml:"}},
     {{"scene.xml", "--integrator", "photons"},
-     {"'photons'", "langevin", "pssmlt", "mmlt", "h2mc", "lmc", "mlt", "erpt", "path", "bdpt",
-      "light"}},
+     {"'photons'", "langevin", "pssmlt", "mmlt", "h2mc", "lmc", "mala", "mlt", "erpt", "path",
+      "bdpt", "light"}},
     {{"scene.xml", "--set", "speed=1"}, {"'speed'", "drift", "epsilon"}},
     {{"scene.xml", "--set", "drift=sideways"}, {"drift", "'sideways'", "none|gradient|full"}},
     {{"scene.xml", "--set", "epsilon=-1"}, {"epsilon", "'-1'", "> 0"}},
@@ -143,6 +143,8 @@ const std::vector<Mistake> kRenderMistakes{
     {{"scene.xml", "--integrator", "mlt", "--set", "step_min=0.5"}, {"step_min", "step_max"}},
     {{"scene.xml", "--integrator", "erpt", "--set", "pilot=1"}, {"pilot", "'1'", "[256"}},
     {{"scene.xml", "--set", "second_scale=0"}, {"second_scale", "'0'", "> 0"}},
+    {{"scene.xml", "--set", "delayed_rejection=on"}, {"delayed_rejection", "mode=chain"}},
+    {{"scene.xml", "--set", "levels=2", "--set", "mode=chain"}, {"levels", "mode=splitting"}},
     {{"scene.xml", "--time", "1", "--mutations-per-pixel", "4"}, {"only one", "--time"}},
     {{"scene.xml", "--integrator", "path", "--time", "1", "--spp", "4"}, {"only one", "--spp"}},
     {{"scene.xml", "-v", "-q"}, {"-v", "-q"}},
@@ -229,8 +231,9 @@ TEST_F(Cli, InfoCountsTheSceneAndListsTheIntegrators) {
   EXPECT_EQ(scene.out.find("limit"), std::string::npos) << scene.out;
   const Outcome integrators = run({"info", "--integrators"});
   EXPECT_EQ(integrators.exit_code, 0) << integrators.err;
-  for (const char* part : {"langevin: ", "path: ", "bdpt: ", "light: ", "drift",
-                           "none|gradient|full", "epsilon", "balance|power", "max_depth", "doi"})
+  for (const char* part : {"langevin: ", "pssmlt: ", "mmlt: ", "h2mc: ", "lmc: ", "mala: ", "mlt: ",
+                           "erpt: ", "path: ", "bdpt: ", "light: ", "drift", "none|gradient|full",
+                           "epsilon", "balance|power", "max_depth", "doi"})
     EXPECT_NE(integrators.out.find(part), std::string::npos) << part << integrators.out;
 }
 
@@ -403,8 +406,8 @@ TEST_F(Cli, TheSameSeedGivesTheSameBytesOnAnyNumberOfThreads) {
 }
 
 TEST_F(Cli, TimeEndsTheRender) {
-  for (const char* integrator :
-       {"langevin", "pssmlt", "mmlt", "h2mc", "lmc", "mlt", "erpt", "path", "bdpt", "light"}) {
+  for (const char* integrator : {"langevin", "pssmlt", "mmlt", "h2mc", "lmc", "mala", "mlt", "erpt",
+                                 "path", "bdpt", "light"}) {
     const auto start = std::chrono::steady_clock::now();
     const Outcome outcome = run({"render", "scene.xml", "--integrator", integrator, "--time", "0.4",
                                  "-o", "a.exr", "--stats", "s.json"});

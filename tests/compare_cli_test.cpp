@@ -115,14 +115,15 @@ class CompareCli : public ::testing::Test {
 
 TEST_F(CompareCli, GivesAllFiguresOfAllIntegrators) {
   render_reference();
-  const Outcome outcome =
-      compare({"--reference", "reference.exr", "--integrators",
-               "path,langevin:mode=chain:chains=16:bootstrap=20000:direct=chain", "--spp", "16",
-               "--mutations-per-pixel", "40", "--runs", "3", "--seed", "5", "-t", "2"});
+  const Outcome outcome = compare(
+      {"--reference", "reference.exr", "--integrators",
+       "path,langevin:mode=chain:chains=16:bootstrap=20000:direct=chain:delayed_rejection=on",
+       "--spp", "16", "--mutations-per-pixel", "40", "--runs", "3", "--seed", "5", "-t", "2"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_TRUE(contains(outcome.out, "relMSE")) << outcome.out;
   EXPECT_TRUE(contains(outcome.out, "wrote out/report.html")) << outcome.out;
-  const std::string chain = "langevin_mode=chain_chains=16_bootstrap=20000_direct=chain";
+  const std::string chain =
+      "langevin_mode=chain_chains=16_bootstrap=20000_direct=chain_delayed_rejection=on";
   EXPECT_EQ(files("out"),
             (std::set<std::string>{"results.json", "results.csv", "report.html", "error_scale.png",
                                    "reference.png", "path.exr", "path.png", "path_error.png",
@@ -179,7 +180,7 @@ TEST_F(CompareCli, GivesAllFiguresOfAllIntegrators) {
   EXPECT_EQ(seeds, (std::set<std::uint64_t>{5, 6, 7, 8, 9, 10}));
   EXPECT_TRUE(all.at("integrators")[0].at("acceptance").is_null());
   const json& acceptance = all.at("integrators")[1].at("acceptance");
-  for (const char* kernel : {"large_step", "small_step"}) {
+  for (const char* kernel : {"large_step", "small_step", "second_step"}) {
     EXPECT_GT(acceptance.at(kernel).get<double>(), 0.05);
     EXPECT_LT(acceptance.at(kernel).get<double>(), 1.0);
   }

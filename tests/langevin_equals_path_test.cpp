@@ -131,6 +131,11 @@ LoadedScene load_scene_of(const std::string& name) {
   return load_small(name);
 }
 
+/// Whether particles are to carry something.
+bool has_small_emitter(const std::string& scene) {
+  return scene == "sun_pane" || scene == "lamp_in_glass";
+}
+
 /// Path-traced tiles of a scene, rendered once for all ways.
 const std::vector<test::Moments>& traced_tiles(const std::string& scene) {
   static std::map<std::string, std::vector<test::Moments>> known;
@@ -178,7 +183,11 @@ TEST_P(LangevinEqualsPath, TileMeans) {
     RenderOptions render;
     render.seed = seed;
     const double amount = way.mode == Mode::Chain ? work.mutations_per_pixel : 40;
-    return render_langevin(loaded.scene, options, render, amount).image;
+    LangevinResult result = render_langevin(loaded.scene, options, render, amount);
+    if (way.splitting.all && has_small_emitter(scene)) {
+      EXPECT_GT(result.statistics.split_sequences, 0U);
+    }
+    return std::move(result.image);
   });
   test::expect_equal_tiles(name, tiles, traced_tiles(scene), work.resolution);
 }
@@ -200,8 +209,9 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"limelight", "chains_alone"}, Case{"limelight", "rare_light_subpaths"},
                     Case{"limelight", "diagonal"}, Case{"limelight", "half_perturbed"},
                     Case{"coated", "gradient"}, Case{"coated", "redistribution_both_ends"},
-                    Case{"sun_pane", "high_threshold"}, Case{"lamp_in_glass", "two_levels"},
-                    Case{"plan", "both_ends"}, Case{"lens", "redistribution"}),
+                    Case{"sun_pane", "high_threshold"}, Case{"sun_pane", "eight_levels"},
+                    Case{"lamp_in_glass", "two_levels"}, Case{"plan", "both_ends"},
+                    Case{"lens", "redistribution"}),
     name_of);
 
 /// All of them, but for an island of glass_caustic, the lamp's reflection, that one strategy alone
@@ -251,6 +261,7 @@ TEST_P(PrimaryEqualsPath, TileMeans) {
       options.cache = 1000;
       return render_lmc(loaded.scene, options, render, amount).image;
     }
+    if (name == "mala") return render_mala(loaded.scene, with(MalaOptions{}), render, amount).image;
     if (name == "h2mc_delayed") {
       H2mcOptions options = with(H2mcOptions{});
       options.delayed_rejection = true;
@@ -264,13 +275,14 @@ TEST_P(PrimaryEqualsPath, TileMeans) {
 INSTANTIATE_TEST_SUITE_P(Some, PrimaryEqualsPath,
                          testing::Values(Case{"limelight", "mmlt"}, Case{"limelight", "pssmlt"},
                                          Case{"limelight", "h2mc_delayed"},
-                                         Case{"limelight", "lmc_cached"}, Case{"lens", "lmc"}),
+                                         Case{"limelight", "lmc_cached"}, Case{"lens", "lmc"},
+                                         Case{"limelight", "mala"}),
                          name_of);
 
 std::vector<Case> all_primary_cases() {
   std::vector<Case> cases;
   for (const auto& scene : works())
-    for (const char* name : {"pssmlt", "mmlt", "h2mc", "h2mc_delayed", "lmc", "lmc_cached"})
+    for (const char* name : {"pssmlt", "mmlt", "h2mc", "h2mc_delayed", "lmc", "lmc_cached", "mala"})
       cases.emplace_back(scene.first, name);
   return cases;
 }

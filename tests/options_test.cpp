@@ -48,6 +48,29 @@ TEST(Options, EveryEntryHasTextAndSurvivesIt) {
   EXPECT_EQ(options.kernel.time_step_cap, 1.0 / 3.0);
 }
 
+// Law: an option that does nothing in the mode, or without another one, says what it needs.
+TEST(Options, ConditionsFollowTheOtherOptions) {
+  LangevinOptions options;
+  const auto list = entries(options);
+  const auto error = [&](const std::string& name) {
+    return option_error([&] { check_condition(list, name); });
+  };
+  EXPECT_EQ(error("chains"), "option chains does nothing without mode=chain");
+  EXPECT_EQ(error("levels"), "");
+  EXPECT_EQ(error("threshold"), "");
+  EXPECT_EQ(error("drift"), "");
+  options.mode = Mode::Redistribution;
+  EXPECT_EQ(error("levels"), "option levels does nothing without mode=splitting");
+  EXPECT_EQ(error("threshold"), "");
+  options.mode = Mode::Chain;
+  EXPECT_EQ(error("chains"), "");
+  EXPECT_EQ(error("threshold"),
+            "option threshold does nothing without mode=redistribution or splitting");
+  EXPECT_EQ(error("second_scale"), "option second_scale does nothing without delayed_rejection=on");
+  options.delayed_rejection = true;
+  EXPECT_EQ(error("second_scale"), "");
+}
+
 TEST(Options, SetReachesTheFields) {
   LangevinOptions options;
   const auto list = entries(options);

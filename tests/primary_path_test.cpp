@@ -197,6 +197,49 @@ TEST(PrimaryPath, HessianIsThatOfDifferencesOfGradients) {
   }
 }
 
+/// Law: the matrix of constraints is that of the differences of their residuals, and of no numbers
+/// but those that steer something.
+TEST(PrimaryPath, ConstraintsAreThoseOfDifferences) {
+  for (const TestScene& test : test_scenes()) {
+    const EmissionGuide unguided(test.scene);
+    const PrimaryFunction function(test.scene, unguided);
+    Agreement agreement;
+    PrimaryDerivatives derivatives;
+    PrimaryDerivatives alone;
+    Rng rng(19, Stream::Test, 0);
+    for (const Found& found : found_paths(test.scene, 6, 3000, 18)) {
+      if (!function.gradient_and_constraints(found.numbers, found.path, derivatives)) continue;
+      ASSERT_TRUE(function.gradient(found.numbers, found.path, alone));
+      EXPECT_LE((alone.gradient - derivatives.gradient).norm(),
+                1e-9 * (1.0 + alone.gradient.norm()));
+      // x^T Q x = 1/9 sum_k w_k (dr_k / dx)^2 along some direction x.
+      const int d = static_cast<int>(derivatives.gradient.size());
+      Vector x(d);
+      double least = 1.0;
+      for (int i = 0; i < d; ++i) {
+        x[i] = rng.normal();
+        least = std::min(least, room(found, i) / (1.0 + std::abs(x[i])));
+      }
+      const auto at = function.residuals(found.numbers, found.path);
+      double numeric = 0;
+      double error = 0;
+      for (std::size_t k = 0; k < at.size(); ++k) {
+        const auto f = [&](double h) {
+          StrategyNumbers numbers = found.numbers;
+          for (int i = 0; i < d; ++i) numbers.steering(found.path.strategy, i) += h * x[i];
+          return function.residuals(numbers, found.path)[k].value;
+        };
+        const Derivative slope = ridders(f, least);
+        numeric += at[k].precision / 9.0 * slope.value * slope.value;
+        error += at[k].precision / 9.0 * 2.0 * std::abs(slope.value) * slope.error;
+      }
+      agreement.add(x.dot(derivatives.constraints * x), {numeric, error}, 1.0);
+    }
+    EXPECT_GT(agreement.count(), 40) << test.name;
+    EXPECT_GT(agreement.share(), 0.98) << test.name;
+  }
+}
+
 using Jet2 = ceres::Jet<double, 2>;
 
 /// |dv / du1 x dv / du2|

@@ -200,6 +200,8 @@ TEST(Primary, DoesNotDependOnThreads) {
   lmc.bootstrap = 1000;
   LmcOptions cached = lmc;
   cached.cache = 100;
+  MalaOptions mala;
+  mala.bootstrap = 1000;
   std::vector<std::vector<float>> images;
   for (const int threads : {1, 2, 4}) {
     RenderOptions render;
@@ -210,9 +212,10 @@ TEST(Primary, DoesNotDependOnThreads) {
     images.push_back(render_h2mc(scene, h2mc, render, 1).image.rgb);
     images.push_back(render_lmc(scene, lmc, render, 1).image.rgb);
     images.push_back(render_lmc(scene, cached, render, 1).image.rgb);
+    images.push_back(render_mala(scene, mala, render, 1).image.rgb);
   }
   EXPECT_NE(images[3], images[4]);
-  for (std::size_t i = 5; i < images.size(); ++i) EXPECT_EQ(images[i], images[i % 5]);
+  for (std::size_t i = 6; i < images.size(); ++i) EXPECT_EQ(images[i], images[i % 6]);
 }
 
 TEST(StrategyChain, RefusesWhatIsNotANumber) {
@@ -238,6 +241,13 @@ TEST(Primary, OptionsAreChecked) {
   LmcOptions lmc;
   lmc.adaptation_decay = 1.5;
   EXPECT_THROW(lmc.validate(), OptionError);
+  MalaOptions mala;
+  EXPECT_NO_THROW(mala.validate());
+  mala.kernel.drift = Drift::Full;
+  EXPECT_THROW(mala.validate(), OptionError);
+  mala.kernel = {};
+  mala.kernel.preconditioner = PreconditionerKind::Hessian;
+  EXPECT_THROW(mala.validate(), OptionError);
 }
 
 }  // namespace

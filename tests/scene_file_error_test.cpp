@@ -162,7 +162,7 @@ const Fault kPluginFaults[] = {
      {"two wavelengths"}},
     {"UnknownMetal",
      R"(<bsdf type="conductor">@<string name="material" value="Unobtainium"/></bsdf>)",
-     {"'Unobtainium'", "Ag, Al, Au, Cr, Cu, W"}},
+     {"'Unobtainium'", "Ag, Al, AlAs"}},
     {"UnknownIndex",
      R"(<bsdf type="dielectric">@<string name="intIOR" value="jelly"/></bsdf>)",
      {"'jelly'", "bk7", "diamond"}},

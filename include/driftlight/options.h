@@ -133,6 +133,9 @@ struct LangevinOptions {
   /// Mira 1999; Green and Mira 2001).
   bool delayed_rejection = false;
   double second_scale = 0.2;
+  /// Of Mode::Chain: a pilot tunes the scale of small steps until so many of them are accepted; 0:
+  /// it is as given.
+  double target_acceptance = 0;
   /// Independent chains, whatever the number of threads.
   int chains = 128;
   /// Samples that estimate the normalization b and start the chains.
@@ -251,6 +254,19 @@ struct LmcOptions : GaussianStepOptions {
   void validate() const;
 };
 
+/// The Langevin step of [E63] in primary sample space, with its matrix from the constraints of the
+/// path.
+struct MalaOptions : GaussianStepOptions {
+  /// Without Drift::Full, PreconditionerKind::Hessian and apertures. The radius of the trust region
+  /// is `trust` / 2, half of the circle that a number is on.
+  KernelOptions kernel;
+  /// A pilot tunes the scale until so many Langevin steps are accepted; 0: it is as given.
+  double target_acceptance = 0;
+
+  /// Throws OptionError.
+  void validate() const;
+};
+
 /// Mutations of a path by its vertices (Veach and Guibas 1997): steps of the perturbations.
 struct PerturbationOptions {
   /// Sizes between which they are drawn log-uniformly, in widths of the film; directions move by
@@ -296,6 +312,13 @@ struct OptionEntry {
   std::string_view help;
   std::function<std::string()> get;
   std::function<void(const std::string&)> set;  ///< throws OptionError
+
+  /// The setting of another option without which this one does nothing, and whether it is made.
+  struct Condition {
+    std::string_view text;
+    std::function<bool()> holds;
+  };
+  std::optional<Condition> condition = std::nullopt;
 };
 
 /// The options of an integrator, in the order in which they are listed.
@@ -307,11 +330,15 @@ std::vector<OptionEntry> entries(PrimaryOptions& options);
 std::vector<OptionEntry> entries(MmltOptions& options);
 std::vector<OptionEntry> entries(H2mcOptions& options);
 std::vector<OptionEntry> entries(LmcOptions& options);
+std::vector<OptionEntry> entries(MalaOptions& options);
 std::vector<OptionEntry> entries(MltOptions& options);
 std::vector<OptionEntry> entries(ErptOptions& options);
 
 /// Sets `name` to `value`. Throws OptionError naming the option and the valid ones or values.
 void set_option(const std::vector<OptionEntry>& entries, const std::string& name,
                 const std::string& value);
+
+/// Throws OptionError if the option does nothing beside the values that the others have.
+void check_condition(const std::vector<OptionEntry>& entries, const std::string& name);
 
 }  // namespace driftlight

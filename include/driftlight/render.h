@@ -181,6 +181,14 @@ LangevinResult render_h2mc(const Scene& scene, const H2mcOptions& options,
 LangevinResult render_lmc(const Scene& scene, const LmcOptions& options,
                           const RenderOptions& render, double mutations_per_pixel);
 
+/// Renders with the Langevin step of [E63] in primary sample space: chains as of MMLT, whose small
+/// steps have the drift of the gradient and the matrix of the constraints, both by the numbers of a
+/// path. There sampling has done away with the constraints of lobes and lights that a number draws
+/// from; those of the vertices that a strategy connects remain. Statistics as of Mode::Chain.
+/// Throws as render_langevin.
+LangevinResult render_mala(const Scene& scene, const MalaOptions& options,
+                           const RenderOptions& render, double mutations_per_pixel);
+
 /// Renders with Metropolis light transport (Veach and Guibas 1997, "Metropolis light transport";
 /// Veach 1997, ch. 11): chains of paths by their vertices, with bidirectional mutations and lens,
 /// caustic and multi-chain perturbations. Statistics as of Mode::Chain, the bidirectional mutations

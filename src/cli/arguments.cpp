@@ -44,12 +44,13 @@ std::pair<std::string, std::string> split_setting(std::string_view flag, const s
   return {text.substr(0, equals), text.substr(equals + 1)};
 }
 
-constexpr std::array<std::pair<Integrator, std::string_view>, 10> kIntegrators{
+constexpr std::array<std::pair<Integrator, std::string_view>, 11> kIntegrators{
     {{Integrator::Langevin, "langevin"},
      {Integrator::Pssmlt, "pssmlt"},
      {Integrator::Mmlt, "mmlt"},
      {Integrator::H2mc, "h2mc"},
      {Integrator::Lmc, "lmc"},
+     {Integrator::Mala, "mala"},
      {Integrator::Mlt, "mlt"},
      {Integrator::Erpt, "erpt"},
      {Integrator::Path, "path"},
@@ -103,7 +104,7 @@ void declare_render(CLI::App& app, Raw& raw) {
                  "(default: the scene's name with .exr, in this folder)")
       ->type_name("FILE");
   app.add_option("--integrator", raw.integrator,
-                 "langevin, pssmlt, mmlt, h2mc, lmc, mlt, erpt, path, bdpt or light")
+                 "langevin, pssmlt, mmlt, h2mc, lmc, mala, mlt, erpt, path, bdpt or light")
       ->capture_default_str();
   add_repeatable(app, "-D,--define", raw.defines, "value for $NAME in the scene; repeatable")
       ->type_name("NAME=VALUE");
@@ -111,8 +112,9 @@ void declare_render(CLI::App& app, Raw& raw) {
                  "option of the integrator, see `driftlight info --integrators`; repeatable")
       ->type_name("OPTION=VALUE");
   app.add_option("--time", raw.time, "render for this long")->type_name("SECONDS");
-  app.add_option("--mutations-per-pixel", raw.mutations_per_pixel,
-                 "work of langevin with mode=chain, pssmlt, mmlt, h2mc, lmc and mlt (default: 100)")
+  app.add_option(
+         "--mutations-per-pixel", raw.mutations_per_pixel,
+         "work of langevin with mode=chain, pssmlt, mmlt, h2mc, lmc, mala and mlt (default: 100)")
       ->type_name("N");
   app.add_option("--spp", raw.samples_per_pixel,
                  "work of all others, samples per pixel (default: 64)")
@@ -247,12 +249,12 @@ void set_work(const Raw& raw, RenderCommand& command) {
   const bool chains =
       command.integrator == Integrator::Pssmlt || command.integrator == Integrator::Mmlt ||
       command.integrator == Integrator::H2mc || command.integrator == Integrator::Lmc ||
-      command.integrator == Integrator::Mlt;
+      command.integrator == Integrator::Mala || command.integrator == Integrator::Mlt;
   if (raw.mutations_per_pixel && !chains && command.integrator != Integrator::Langevin)
-    throw UsageError(
-        fmt::format("--mutations-per-pixel is for the langevin, pssmlt, mmlt, h2mc, lmc and mlt "
-                    "integrators; {} takes --spp",
-                    raw.integrator));
+    throw UsageError(fmt::format(
+        "--mutations-per-pixel is for the langevin, pssmlt, mmlt, h2mc, lmc, mala and mlt "
+        "integrators; {} takes --spp",
+        raw.integrator));
   if (raw.samples_per_pixel && chains)
     throw UsageError(fmt::format("{} takes --mutations-per-pixel, not --spp", raw.integrator));
   command.work = parse_work(raw);

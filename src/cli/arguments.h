@@ -23,7 +23,7 @@ class UsageError : public InputError {
   using InputError::InputError;
 };
 
-enum class Integrator { Langevin, Pssmlt, Mmlt, H2mc, Lmc, Mlt, Erpt, Path, Bdpt, Light };
+enum class Integrator { Langevin, Pssmlt, Mmlt, H2mc, Lmc, Mala, Mlt, Erpt, Path, Bdpt, Light };
 enum class Verbosity { Quiet, Normal, Verbose };
 
 struct SceneArguments {

@@ -138,11 +138,12 @@ Json agreement_json(const Contender& contender) {
 /// Over all runs, of each kernel that has proposed anything.
 Json acceptance_json(const Contender& contender) {
   Json all = Json::object();
-  for (const char* kernel : {"large_step", "small_step"}) {
+  for (const char* kernel : {"large_step", "small_step", "second_step"}) {
     double proposed = 0;
     double accepted = 0;
     for (const Run& run : contender.runs) {
-      if (!run.statistics.contains("kernels")) continue;
+      if (!run.statistics.contains("kernels") || !run.statistics["kernels"].contains(kernel))
+        continue;
       const Json& of_run = run.statistics["kernels"][kernel];
       const auto count = of_run["proposed"].get<double>();
       proposed += count;

@@ -112,8 +112,10 @@ std::string describe_integrator(std::string_view name, std::string_view method) 
   std::vector<std::array<std::string, 4>> rows;
   std::array<std::size_t, 4> widths{};
   for (const OptionEntry& option : entries(defaults)) {
+    const std::string condition =
+        option.condition ? fmt::format("with {}: ", option.condition->text) : "";
     rows.push_back({std::string(option.name), option.values, "default " + option.get(),
-                    std::string(option.help)});
+                    condition + std::string(option.help)});
     for (std::size_t i = 0; i < widths.size(); ++i)
       widths.at(i) = std::max(widths.at(i), rows.back().at(i).size());
   }
@@ -175,6 +177,12 @@ void run(const IntegratorsCommand& /*command*/) {
           "lmc",
           "mmlt with Langevin steps and a diagonal preconditioner that adapts to gradients (Luan, "
           "Zhao, Bala and Gkioulekas 2020, doi 10.1145/3386569.3392382)") +
+      describe_integrator<MalaOptions>(
+          "mala",
+          "mmlt with the Langevin steps of langevin: drift, and a matrix from the constraints of "
+          "the "
+          "path, in primary sample space (Ershov, Frolov, Nikolaev and Voloboy 2023, "
+          "doi 10.20948/prepr-2023-63)") +
       describe_integrator<MltOptions>(
           "mlt",
           "Metropolis light transport by bidirectional mutations and lens, caustic and multi-chain "

@@ -46,6 +46,11 @@ LangevinResult result_of(const Scene& scene, const LmcOptions& options, const Re
   return render_lmc(scene, options, how, mutations(work));
 }
 
+LangevinResult result_of(const Scene& scene, const MalaOptions& options, const RenderOptions& how,
+                         const Work& work) {
+  return render_mala(scene, options, how, mutations(work));
+}
+
 LangevinResult result_of(const Scene& scene, const MltOptions& options, const RenderOptions& how,
                          const Work& work) {
   return render_mlt(scene, options, how, mutations(work));
@@ -77,6 +82,7 @@ std::string_view name_of(const PssmltOptions& /*options*/) {
 std::string_view name_of(const MmltOptions& /*options*/) { return cli::name_of(Integrator::Mmlt); }
 std::string_view name_of(const H2mcOptions& /*options*/) { return cli::name_of(Integrator::H2mc); }
 std::string_view name_of(const LmcOptions& /*options*/) { return cli::name_of(Integrator::Lmc); }
+std::string_view name_of(const MalaOptions& /*options*/) { return cli::name_of(Integrator::Mala); }
 std::string_view name_of(const MltOptions& /*options*/) { return cli::name_of(Integrator::Mlt); }
 std::string_view name_of(const ErptOptions& /*options*/) { return cli::name_of(Integrator::Erpt); }
 std::string_view name_of(const PathOptions& /*options*/) { return cli::name_of(Integrator::Path); }
@@ -107,6 +113,8 @@ IntegratorOptions options_of(Integrator integrator) {
       return H2mcOptions{};
     case Integrator::Lmc:
       return LmcOptions{};
+    case Integrator::Mala:
+      return MalaOptions{};
     case Integrator::Mlt:
       return MltOptions{};
     case Integrator::Erpt:
@@ -128,6 +136,7 @@ std::vector<OptionEntry> entries_of(IntegratorOptions& options) {
 void apply(const Settings& settings, IntegratorOptions& options) {
   const std::vector<OptionEntry> known = entries_of(options);
   for (const auto& [name, value] : settings) set_option(known, name, value);
+  for (const auto& [name, value] : settings) check_condition(known, name);
 }
 
 std::string take_depth(const LoadedScene& loaded, const Settings& settings,

@@ -19,8 +19,8 @@ namespace driftlight::cli {
 
 /// In the order of `Integrator`.
 using IntegratorOptions =
-    std::variant<LangevinOptions, PssmltOptions, MmltOptions, H2mcOptions, LmcOptions, MltOptions,
-                 ErptOptions, PathOptions, BdptOptions, LightOptions>;
+    std::variant<LangevinOptions, PssmltOptions, MmltOptions, H2mcOptions, LmcOptions, MalaOptions,
+                 MltOptions, ErptOptions, PathOptions, BdptOptions, LightOptions>;
 
 /// The defaults.
 IntegratorOptions options_of(Integrator integrator);
@@ -28,7 +28,8 @@ IntegratorOptions options_of(Integrator integrator);
 /// Bound to these options.
 std::vector<OptionEntry> entries_of(IntegratorOptions& options);
 
-/// Throws OptionError naming the option and the valid ones or values.
+/// Throws OptionError naming the option and the valid ones or values, also of one that does nothing
+/// beside the others.
 void apply(const Settings& settings, IntegratorOptions& options);
 
 /// Unless one of the settings is the depth, takes it from the scene. A notice, empty if there is

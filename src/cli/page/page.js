@@ -373,6 +373,7 @@ function showSamplerTable() {
      ({ effective_samples_per_second: x }) => x === null ? null : -x],
     acceptanceColumn("large steps accepted", "large_step"),
     acceptanceColumn("small steps accepted", "small_step"),
+    acceptanceColumn("second steps accepted", "second_step"),
     ["families", ({ effective_families: families }) => number(families)],
   ]);
 }
