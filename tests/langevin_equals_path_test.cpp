@@ -209,9 +209,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"limelight", "chains_alone"}, Case{"limelight", "rare_light_subpaths"},
                     Case{"limelight", "diagonal"}, Case{"limelight", "half_perturbed"},
                     Case{"coated", "gradient"}, Case{"coated", "redistribution_both_ends"},
-                    Case{"sun_pane", "high_threshold"}, Case{"sun_pane", "eight_levels"},
-                    Case{"lamp_in_glass", "two_levels"}, Case{"plan", "both_ends"},
-                    Case{"lens", "redistribution"}),
+                    Case{"sun_pane", "high_threshold"}, Case{"lamp_in_glass", "two_levels"},
+                    Case{"plan", "both_ends"}, Case{"lens", "redistribution"}),
     name_of);
 
 /// All of them, but for an island of glass_caustic, the lamp's reflection, that one strategy alone
