@@ -139,6 +139,20 @@ TEST(Dialect, Mitsuba3TakesTheFirstOfSeveralSensors) {
   expect_contains(loaded.notices[0], "sensor");
 }
 
+TEST(Dialect, Mitsuba3HasSmallMatrices) {
+  const auto shape = [](const std::string& name) {
+    return R"(<shape type="sphere"><transform name=")" + name +
+           R"("><matrix value="0 -2 0  2 0 0  0 0 2"/><translate x="5"/></transform></shape>)";
+  };
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(lit3(shape("to_world")));
+  const auto& sphere = std::get<Sphere>(loaded.scene.shapes()[0].geometry);
+  expect_near(sphere.center, Vec3d(5, 0, 0));
+  EXPECT_NEAR(sphere.radius, 2.0, 1e-12);
+  expect_near(Vec3d(sphere.to_local.row(0)), Vec3d(0, 1, 0));
+  expect_contains(error_of(lit(shape("toWorld"))), "16 numbers");
+}
+
 // --- Ids -----------------------------------------------------------------------------------------
 
 const std::string kRedShape = R"(<shape type="sphere"><ref id="red"/></shape>)";

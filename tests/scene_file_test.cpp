@@ -12,6 +12,7 @@ namespace driftlight {
 namespace {
 
 using test::complete;
+using test::expect_contains;
 using test::expect_near;
 using test::kEmitter;
 using test::kShape;
@@ -124,6 +125,22 @@ TEST(SceneFile, KeepsTheDepthOfForeignBlocks) {
 }
 
 // --- The sensor ----------------------------------------------------------------------------------
+
+// Law: without an up the sensor is turned as Mitsuba's is, which differs by version.
+TEST(SensorXml, LooksAtWithoutUp) {
+  const auto up = [](const std::string& attribute, const std::string& version) {
+    std::string file = scene_file(
+        sensor(R"(<transform name="toWorld"><lookat origin="1, 2, 3" target="1.6, 2, 3.8")" +
+               attribute + "/></transform>") +
+        kEmitter + kShape);
+    file.replace(file.find("0.6.0"), 5, version);
+    return SceneDirectory().load(file).scene.camera().up;
+  };
+  for (const std::string attribute : {"", R"( up="")", R"( up="0, 0, 0")"}) {
+    expect_near(up(attribute, "0.6.0"), Vec3d(0, -1, 0));
+    expect_near(up(attribute, "3.0.0"), Vec3d(0.8, 0, -0.6));
+  }
+}
 
 TEST(SensorXml, LooksAlongZWithXOnTheLeft) {
   const Camera camera = load_camera(R"(<float name="fov" value="60"/>)");

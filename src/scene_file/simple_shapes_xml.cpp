@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "bsdfs_xml.h"
-#include "driftlight/frame.h"
+#include "direction_across.h"
 #include "shape_readers.h"
 #include "transform_geometry.h"
 
@@ -28,15 +28,6 @@ void append_quad(TriangleMesh& mesh, const Quad& quad, const Eigen::Affine3d& to
   const std::uint32_t last = reverse ? first + 1 : first + 3;
   mesh.triangles.push_back({first, second, first + 2});
   mesh.triangles.push_back({first + 2, last, first});
-}
-
-/// Where Mitsuba begins to count the angle around an axis.
-Vec3d first_direction(const Vec3d& axis, Dialect dialect) {
-  if (dialect == Dialect::Mitsuba3) return tangent_basis(axis).t;
-  const bool leans_to_x = std::abs(axis.x()) > std::abs(axis.y());
-  const Vec3d across =
-      leans_to_x ? Vec3d(axis.z(), 0.0, -axis.x()) : Vec3d(0.0, axis.z(), -axis.y());
-  return across.normalized().cross(axis);
 }
 
 }  // namespace
@@ -102,7 +93,8 @@ std::vector<ShapePart> read_cylinder(Properties& properties, LoadContext&, const
   const Vec3d p1 = properties.point("p1").value_or(Vec3d(0, 0, 1));
   if (!((p1 - p0).norm() > 0.0)) properties.fail("p1", "must not be 'p0'");
   const Vec3d axis = (p1 - p0).normalized();
-  const Vec3d x = first_direction(axis, properties.dialect());
+  // Where Mitsuba begins to count the angle.
+  const Vec3d x = direction_across(axis, properties.dialect());
   Cylinder cylinder;
   cylinder.base = p0;
   cylinder.length = (p1 - p0).norm();
