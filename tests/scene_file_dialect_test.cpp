@@ -139,6 +139,39 @@ TEST(Dialect, Mitsuba3TakesTheFirstOfSeveralSensors) {
   expect_contains(loaded.notices[0], "sensor");
 }
 
+TEST(Dialect, MetalsAreNotInAirInMitsuba3) {
+  const std::string shape =
+      R"(<shape type="sphere"><bsdf type="conductor"><string name="material" value="Au"/></bsdf>
+         </shape>)";
+  const auto older = std::get<Conductor>(first_bsdf(lit(shape)));
+  const auto newer = std::get<Conductor>(first_bsdf(lit3(shape)));
+  expect_near(newer.eta, Rgbd(1.000277 * older.eta));
+  expect_near(newer.k, Rgbd(1.000277 * older.k));
+}
+
+TEST(Dialect, OpacityIsOneNumberInMitsuba3) {
+  const std::string shape =
+      R"(<shape type="sphere"><bsdf type="mask"><rgb name="opacity" value="1, 0.5, 0"/>
+         <bsdf type="diffuse"/></bsdf></shape>)";
+  expect_near(std::get<Mask>(first_bsdf(lit(shape))).opacity.color, Rgbd(1, 0.5, 0));
+  const double expected = luminance<double>(Rgbd(1, 0.5, 0));
+  expect_near(std::get<Mask>(first_bsdf(lit3(shape))).opacity.color,
+              Rgbd(Rgbd::Constant(expected)));
+  const SceneDirectory directory;
+  const LoadedScene full = directory.load(
+      lit3(R"(<shape type="sphere"><bsdf type="mask"><float name="opacity" value="3"/>
+              <bsdf type="diffuse"/></bsdf></shape>)"));
+  expect_near(std::get<Mask>(full.scene.bsdfs()[0]).opacity.color, Rgbd(1, 1, 1));
+  ASSERT_EQ(full.notices.size(), 1U);
+  expect_contains(full.notices[0], "'opacity'");
+}
+
+TEST(Dialect, OnlyMitsuba06HasADefaultWeight) {
+  expect_contains(error_of(lit3(R"(<shape type="sphere"><bsdf type="blendbsdf">
+                                   <bsdf type="diffuse"/><bsdf type="diffuse"/></bsdf></shape>)")),
+                  "'weight'");
+}
+
 TEST(Dialect, Mitsuba3HasSmallMatrices) {
   const auto shape = [](const std::string& name) {
     return R"(<shape type="sphere"><transform name=")" + name +
@@ -151,6 +184,16 @@ TEST(Dialect, Mitsuba3HasSmallMatrices) {
   EXPECT_NEAR(sphere.radius, 2.0, 1e-12);
   expect_near(Vec3d(sphere.to_local.row(0)), Vec3d(0, 1, 0));
   expect_contains(error_of(lit(shape("toWorld"))), "16 numbers");
+}
+
+TEST(Dialect, TwoSidedGlassOfMitsuba3IsRefused) {
+  const auto shape = [](const std::string& bsdf) {
+    return lit3(R"(<shape type="sphere"><bsdf type="twosided">
+                   <boolean name="allow_transmission" value="true"/><bsdf type=")" +
+                bsdf + R"("/></bsdf></shape>)");
+  };
+  EXPECT_TRUE(std::holds_alternative<Diffuse>(first_bsdf(shape("diffuse"))));
+  expect_contains(error_of(shape("dielectric")), "transmission");
 }
 
 // --- Ids -----------------------------------------------------------------------------------------

@@ -189,7 +189,8 @@ const Fault kPluginFaults[] = {
      R"(<bsdf type="mask">@<bsdf type="dielectric"/></bsdf>)",
      {"dielectric", "thindielectric"}},
     {"OpacityAboveOne",
-     R"(<bsdf type="mask">@<rgb name="opacity" value="2"/><bsdf type="diffuse"/></bsdf>)",
+     R"(<bsdf type="mask"><boolean name="ensureEnergyConservation" value="false"/>)"
+     R"(@<rgb name="opacity" value="2"/><bsdf type="diffuse"/></bsdf>)",
      {"'opacity'", "between 0 and 1"}},
     {"TwoSidedMask",
      R"(<bsdf type="twosided">@<bsdf type="mask"><bsdf type="diffuse"/></bsdf></bsdf>)",
@@ -200,16 +201,9 @@ const Fault kPluginFaults[] = {
     {"TwoSidedTwice",
      R"(<bsdf type="twosided">@<bsdf type="twosided"><bsdf type="phong"/></bsdf></bsdf>)",
      {"one-sided"}},
-    {"BlendWithoutWeight",
-     R"(@<bsdf type="blendbsdf"><bsdf type="diffuse"/><bsdf type="diffuse"/></bsdf>)",
-     {"'weight'"}},
     {"BlendOfOne",
      R"(@<bsdf type="blendbsdf"><float name="weight" value="0.5"/><bsdf type="diffuse"/></bsdf>)",
      {"two nested bsdfs"}},
-    {"WeightAboveOne",
-     R"(<bsdf type="blendbsdf">@<float name="weight" value="1.5"/>)"
-     R"(<bsdf type="diffuse"/><bsdf type="diffuse"/></bsdf>)",
-     {"'weight'", "between 0 and 1"}},
     {"BlendOfGlasses",
      R"(@<bsdf type="blendbsdf"><float name="weight" value="0.5"/><bsdf type="dielectric"/>)"
      R"(<bsdf type="thindielectric"/></bsdf>)",

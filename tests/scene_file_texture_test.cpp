@@ -229,6 +229,10 @@ TEST(VertexColors, AreRefusedWhereTheyCannotBe) {
                           diffuse + "</bsdf>")),
       "another texture");
   expect_contains(
+      error(colored_shape(R"(<bsdf type="blendbsdf"><texture name="weight" type="vertexcolors"/>)" +
+                          diffuse + diffuse + "</bsdf>")),
+      "one number");
+  expect_contains(
       error(colored_shape(
           R"(<emitter type="area"><texture name="radiance" type="vertexcolors"/></emitter>)")),
       "radiance");
