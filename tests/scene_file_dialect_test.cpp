@@ -172,6 +172,23 @@ TEST(Dialect, OnlyMitsuba06HasADefaultWeight) {
                   "'weight'");
 }
 
+TEST(Dialect, Mitsuba3HasLooserTypes) {
+  const std::string loose =
+      R"(<shape type="sphere"><vector name="center" value="1, 2, 3"/>
+         <boolean name="flip_normals" value="True"/></shape>)";
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(lit3(loose));
+  const auto& sphere = std::get<Sphere>(loaded.scene.shapes()[0].geometry);
+  expect_near(sphere.center, Vec3d(1, 2, 3));
+  EXPECT_TRUE(sphere.flip_normals);
+  expect_contains(
+      error_of(lit(R"(<shape type="sphere"><vector name="center" x="1" y="2" z="3"/></shape>)")),
+      "<point>");
+  expect_contains(
+      error_of(lit(R"(<shape type="sphere"><boolean name="flipNormals" value="True"/></shape>)")),
+      "'True'");
+}
+
 TEST(Dialect, Mitsuba3HasSmallMatrices) {
   const auto shape = [](const std::string& name) {
     return R"(<shape type="sphere"><transform name=")" + name +

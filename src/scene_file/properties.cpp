@@ -98,8 +98,9 @@ bool Properties::boolean(std::string_view name, bool fallback) {
   if (!child) return fallback;
   child->allow_attributes({"name", "value"});
   const std::string value = child->text("value");
-  if (value != "true" && value != "false") child->fail("'" + value + "' is not true or false");
-  return value == "true";
+  const std::string lower = dialect() == Dialect::Mitsuba3 ? lower_case(value) : value;
+  if (lower != "true" && lower != "false") child->fail("'" + value + "' is not true or false");
+  return lower == "true";
 }
 
 std::optional<std::string> Properties::text(std::string_view name) {
@@ -136,7 +137,10 @@ std::optional<Vec3d> Properties::vector(std::string_view name) {
 }
 
 std::optional<Vec3d> Properties::coordinates(std::string_view name, const std::string& tag) {
-  const auto child = find(name, {tag});
+  // To Mitsuba 3 points and vectors are the same.
+  std::vector<std::string> tags{tag};
+  if (dialect() == Dialect::Mitsuba3) tags.emplace_back(tag == "point" ? "vector" : "point");
+  const auto child = find(name, tags);
   if (!child) return std::nullopt;
   if (dialect() == Dialect::Mitsuba3)
     child->allow_attributes({"name", "x", "y", "z", "value"});
