@@ -172,6 +172,26 @@ TEST(Dialect, OnlyMitsuba06HasADefaultWeight) {
                   "'weight'");
 }
 
+TEST(Dialect, Mitsuba3FlipsAndShadowsNormals) {
+  const SceneDirectory directory;
+  for (const std::string type : {"bumpmap", "normalmap"}) {
+    const auto notices = [&](const std::string& content, bool newer) {
+      const std::string shape = R"(<shape type="rectangle"><bsdf type=")" + type +
+                                R"("><texture type="checkerboard"/><bsdf type="diffuse"/>)" +
+                                content + "</bsdf></shape>";
+      return directory.load(newer ? lit3(shape) : lit(shape)).notices;
+    };
+    EXPECT_TRUE(notices("", false).empty());
+    ASSERT_EQ(notices("", true).size(), 2U);
+    expect_contains(notices("", true)[0], "flip_invalid_normals");
+    expect_contains(notices("", true)[1], "use_shadowing_function");
+    EXPECT_TRUE(notices(R"(<boolean name="flip_invalid_normals" value="false"/>
+                           <boolean name="use_shadowing_function" value="False"/>)",
+                        true)
+                    .empty());
+  }
+}
+
 TEST(Dialect, Mitsuba3HasLooserTypes) {
   const std::string loose =
       R"(<shape type="sphere"><vector name="center" value="1, 2, 3"/>

@@ -75,6 +75,25 @@ TEST(BitmapXml, LeavesRawFilesAsTheyAre) {
   EXPECT_LT(texture_of(bitmap(""), "3.0.0").bitmap->at(0, 0).x(), 0.22F);
 }
 
+TEST(BitmapXml, NoticesNormalsThatAreDecodedAsSrgb) {
+  const SceneDirectory directory;
+  write_two_greys(directory.path() / "two.png");
+  const auto notices = [&](const std::string& type, const std::string& content) {
+    return directory
+        .load(test::lit(R"(<shape type="rectangle"><bsdf type=")" + type +
+                        R"("><texture type="bitmap"><string name="filename" value="two.png"/>
+                           <string name="filterType" value="bilinear"/>)" +
+                        content + R"(</texture><bsdf type="diffuse"/></bsdf></shape>)"))
+        .notices;
+  };
+  for (const std::string type : {"normalmap", "bumpmap"}) {
+    ASSERT_EQ(notices(type, "").size(), 1U);
+    expect_contains(notices(type, "")[0], "'gamma' as 1");
+    EXPECT_TRUE(notices(type, R"(<float name="gamma" value="1"/>)").empty());
+    EXPECT_TRUE(notices(type, R"(<float name="gamma" value="-1"/>)").empty());
+  }
+}
+
 TEST(BitmapXml, MapsCoordinates) {
   const Texture newer =
       texture_of(bitmap(R"(<transform name="to_uv"><scale x="2" y="3"/><rotate z="1" angle="90"/>

@@ -79,7 +79,7 @@ void read_environment_map(Properties& properties, LoadContext& context) {
   const Eigen::Matrix3d to_world = read_rotation(properties);
   properties.ignore({"cache", "misCompensation"});
   with_location(properties.element(), [&] {
-    Bitmap bitmap = read_bitmap(properties.element().find_file(file), gamma);
+    Bitmap bitmap = read_image_file(properties.element().find_file(file), gamma).bitmap;
     const bool black = std::all_of(bitmap.texels.begin(), bitmap.texels.end(),
                                    [](const auto& texel) { return (texel == 0.0F).all(); });
     if (black || scale == 0.0) throw InputError("the environment map is black");

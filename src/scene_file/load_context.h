@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -116,12 +117,18 @@ struct LoadContext {
   ToneMapping tone_mapping = {};
   std::size_t shape_count = 0;
   std::size_t instanced_triangles = 0;
+  bool has_emitter = false;
+  /// Decoded as sRGB, since neither the scene nor the file says anything else.
+  std::set<std::shared_ptr<const Bitmap>> assumed_srgb = {};
 
-  /// Of very many notices only the first are kept.
   void notice(const Element& element, const std::string& message) {
+    notice(element.location(), message);
+  }
+  /// Of very many notices only the first are kept.
+  void notice(const SourceLocation& at, const std::string& message) {
     constexpr std::size_t kMaximumNotices = 200;
     if (notices.size() < kMaximumNotices)
-      notices.push_back(to_string(element.location()) + ": " + message);
+      notices.push_back(to_string(at) + ": " + message);
     else if (notices.size() == kMaximumNotices)
       notices.emplace_back("further notices are left out");
   }

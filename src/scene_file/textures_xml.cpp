@@ -52,9 +52,11 @@ Texture read_bitmap_texture(Properties& properties, LoadContext& context) {
   const std::string file = properties.required_text("filename");
   std::optional<Gamma> gamma = read_gamma(properties);
   if (properties.boolean("raw", false)) gamma = 1.0;
-  texture.bitmap = with_location(properties.element(), [&] {
-    return std::make_shared<const Bitmap>(read_bitmap(properties.element().find_file(file), gamma));
+  ImageFile image = with_location(properties.element(), [&] {
+    return read_image_file(properties.element().find_file(file), gamma);
   });
+  texture.bitmap = std::make_shared<const Bitmap>(std::move(image.bitmap));
+  if (!gamma && !image.gamma) context.assumed_srgb.insert(texture.bitmap);
   read_mapping(properties, texture);
   read_filter_type(properties, texture, context);
   const std::string both = properties.text("wrapMode").value_or("repeat");
