@@ -267,8 +267,17 @@ TEST(ObjFile, SaysWhatIsWrongWithALibrary) {
     return 0;
   };
   EXPECT_EQ(location("newmtl red\n\nKd 1 zero 0\n"), 3);
-  // Smooth glass under a mask is not supported.
-  EXPECT_EQ(location("newmtl red\n\nnewmtl glass\nillum 4\nd 0.5\n"), 3);
+  EXPECT_EQ(location("newmtl red\n\nnewmtl glass\nillum 2\nKd -1 0 0\n"), 3);
+}
+
+// Smooth glass under a mask would have two ways to transmit.
+TEST(ObjFile, GlassOfALibraryHasNoOpacity) {
+  const SceneDirectory directory;
+  directory.write("some.mtl", "newmtl red\n\nnewmtl wine glass\nillum 4\nd 0.5\n");
+  const LoadedScene loaded = load_painted(directory);
+  EXPECT_TRUE(std::holds_alternative<Dielectric>(fronts(loaded.scene)[2]));
+  ASSERT_EQ(loaded.notices.size(), 1U);
+  expect_contains(loaded.notices[0], "some.mtl:3:1: the opacity of the glass 'wine glass'");
 }
 
 TEST(ObjFile, RefusesBadFiles) {

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <optional>
@@ -37,6 +38,11 @@ bool is_zero(const std::string& numbers) {
   const std::vector<std::string> parts = split_list(numbers);
   return std::all_of(parts.begin(), parts.end(),
                      [](const std::string& part) { return parse_number(part) == 0.0; });
+}
+
+bool is_glass(const MtlMaterial& material) {
+  constexpr std::array kGlass{4, 6, 7, 9};
+  return std::find(kGlass.begin(), kGlass.end(), material.illum) != kGlass.end();
 }
 
 std::string escaped(const std::string& text) {
@@ -135,16 +141,20 @@ class MtlParser {
 /// Writes a material as an XML element on one line.
 class XmlWriter {
  public:
-  /// Images are looked for as files of `element`, of which notices speak, and in the directory.
-  XmlWriter(std::filesystem::path directory, const Element& element, LoadContext& context)
-      : directory_(std::move(directory)), element_(element), context_(context) {}
+  /// Images are looked for as files of `element`, of which notices speak, and beside the file.
+  XmlWriter(std::filesystem::path file, const Element& element, LoadContext& context)
+      : file_(std::move(file)), element_(element), context_(context) {}
 
   std::string bsdf(const MtlMaterial& material) {
     std::string result = scattering(material);
     if (material.bump)
       if (const auto texture = bitmap(*material.bump, "", true))
         result = "<bsdf type=\"bumpmap\">" + *texture + result + "</bsdf>";
-    if (material.mask) {
+    if (material.mask && is_glass(material)) {
+      context_.notice(SourceLocation{file_.string(), material.line, 1},
+                      "the opacity of the glass '" + material.name +
+                          "' is not used: a smooth dielectric cannot be masked");
+    } else if (material.mask) {
       const Paint& mask = *material.mask;
       const std::string opacity =
           mask.image ? paint(mask, "opacity")
@@ -158,17 +168,13 @@ class XmlWriter {
   std::string scattering(const MtlMaterial& material) {
     const bool has_gloss = (material.specular.image || !is_zero(material.specular.color)) &&
                            !is_zero(material.exponent);
+    if (is_glass(material)) return "<bsdf type=\"dielectric\"/>";
     switch (material.illum) {
       case 2:
         if (!has_gloss) break;
         return "<bsdf type=\"phong\">" + paint(material.diffuse, "diffuseReflectance") +
                paint(material.specular, "specularReflectance") +
                fmt::format(R"(<float name="exponent" value="{}"/></bsdf>)", material.exponent);
-      case 4:
-      case 6:
-      case 7:
-      case 9:
-        return "<bsdf type=\"dielectric\"/>";
       case 5:
       case 8:
         return R"(<bsdf type="conductor"><string name="material" value="Al"/></bsdf>)";
@@ -188,7 +194,8 @@ class XmlWriter {
   /// None if there is no such file.
   std::optional<std::string> bitmap(const std::string& image, const std::string& name, bool raw) {
     const std::filesystem::path whole(image);
-    for (const auto& file : {directory_ / whole, directory_ / whole.filename(),
+    const std::filesystem::path directory = file_.parent_path();
+    for (const auto& file : {directory / whole, directory / whole.filename(),
                              element_.find_file(image), element_.find_file(whole.filename())}) {
       if (!std::filesystem::is_regular_file(file)) continue;
       return fmt::format(R"(<texture name="{}" type="bitmap"><string name="filename" value="{}"/>)"
@@ -202,7 +209,7 @@ class XmlWriter {
     return std::nullopt;
   }
 
-  std::filesystem::path directory_;
+  std::filesystem::path file_;
   const Element& element_;
   LoadContext& context_;
 };
@@ -214,7 +221,7 @@ class XmlWriter {
 MaterialLibrary read_material_library(const std::filesystem::path& file, const Element& element,
                                       LoadContext& context) {
   const MtlParser parser(file);
-  XmlWriter writer(file.parent_path(), element, context);
+  XmlWriter writer(file, element, context);
   std::string text = "<materials>";
   int line = 1;
   for (const MtlMaterial& material : parser.materials()) {
