@@ -333,7 +333,9 @@ TEST_P(BadSensor, IsRefusedAtItsPlace) {
 
 const Fault kSensorFaults[] = {
     {"UnknownSensor", R"(@<sensor type="fisheye"/>)", {"'fisheye'", "perspective"}},
-    {"NoFilm", R"(@<sensor type="perspective"/>)", {"<film>"}},
+    {"TwoFilms",
+     R"(<sensor type="perspective"><film type="hdrfilm"/>@<film type="hdrfilm"/></sensor>)",
+     {"second film"}},
     {"UnknownFilter",
      R"(<sensor type="perspective"><film type="hdrfilm">@<rfilter type="gauss"/>)"
      "</film></sensor>",

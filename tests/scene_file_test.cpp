@@ -124,6 +124,48 @@ TEST(SceneFile, KeepsTheDepthOfForeignBlocks) {
   EXPECT_NE(loaded.notices[0].find("<dpt>"), std::string::npos);
 }
 
+// --- The film ------------------------------------------------------------------------------------
+
+/// A scene whose sensor has this content.
+LoadedScene load_with(const std::string& content) {
+  return SceneDirectory().load(
+      scene_file("<sensor type=\"perspective\">" + content + "</sensor>" + kEmitter + kShape));
+}
+
+TEST(FilmXml, ASensorWithoutAFilmHasTheDefaultOne) {
+  const LoadedScene loaded = load_with("");
+  const Camera& camera = loaded.scene.camera();
+  EXPECT_EQ(camera.film_width, 768);
+  EXPECT_EQ(camera.film_height, 576);
+  EXPECT_EQ(camera.filter.kind, ReconstructionFilter::Kind::Gaussian);
+  EXPECT_EQ(camera.filter.radius, 2.0);
+  EXPECT_TRUE(loaded.notices.empty());
+}
+
+TEST(FilmXml, SkipsAnnotations) {
+  const LoadedScene loaded = load_with(
+      R"(<film type="ldrfilm"><string name="label[10, 10]" value="$integrator['type'], $scene['x']"/>
+         <string name="metadata['Author']" value="nobody"/></film>)");
+  ASSERT_EQ(loaded.notices.size(), 1U);
+  expect_contains(loaded.notices[0], "label[10, 10], metadata['Author']");
+  EXPECT_THROW(load_with(R"(<film type="hdrfilm"><string name="labels" value="x"/></film>)"),
+               SceneError);
+  EXPECT_THROW(
+      load_with(R"(<film type="hdrfilm"><string name="label[1,1]" value="$scene"/></film>)"),
+      SceneError);
+}
+
+TEST(FilmXml, NoticesFormatsOfPixels) {
+  for (const std::string format : {"luminance", "rgba", "spectrum"}) {
+    const LoadedScene loaded = load_with(
+        R"(<film type="hdrfilm"><string name="pixelFormat" value=")" + format + R"("/></film>)");
+    ASSERT_EQ(loaded.notices.size(), 1U);
+    expect_contains(loaded.notices[0], "pixelFormat '" + format + "'");
+  }
+  EXPECT_TRUE(load_with(R"(<film type="hdrfilm"><string name="pixelFormat" value="RGB"/></film>)")
+                  .notices.empty());
+}
+
 // --- The sensor ----------------------------------------------------------------------------------
 
 // Law: without an up the sensor is turned as Mitsuba's is, which differs by version.

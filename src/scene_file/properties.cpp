@@ -65,6 +65,16 @@ void Properties::ignore(std::initializer_list<std::string_view> names) {
   for (const std::string_view name : names) find(name);
 }
 
+std::vector<std::string> Properties::ignore_if(bool (*fits)(const std::string& name)) {
+  std::vector<std::string> result;
+  for (Child& child : children_) {
+    if (child.used || child.name.empty() || !fits(child.name)) continue;
+    child.used = true;
+    result.push_back(child.element.find("name").value_or(child.name));
+  }
+  return result;
+}
+
 double Properties::number(std::string_view name, double fallback) {
   const auto child = find(name, {"float", "integer"});
   if (!child) return fallback;

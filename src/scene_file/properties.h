@@ -37,6 +37,9 @@ class Properties {
   std::vector<Element> nested(std::initializer_list<std::string_view> tags);
   /// Allows properties that have no bearing on the picture.
   void ignore(std::initializer_list<std::string_view> names);
+  /// Allows those whose name, in snake case, fits and that nobody has asked for; their names as
+  /// written.
+  std::vector<std::string> ignore_if(bool (*fits)(const std::string& name));
 
   double number(std::string_view name, double fallback);
   double positive(std::string_view name, double fallback);

@@ -47,12 +47,16 @@ const std::string* Substitutions::longest_name(std::string_view text) const {
   return best;
 }
 
-std::string Substitutions::apply(const std::string& text) {
+std::string Substitutions::apply(const std::string& text, Dialect dialect) {
+  const bool keeps_names = dialect == Dialect::Mitsuba06 && text.find('[') != std::string::npos;
   std::string result;
   std::size_t done = 0;
-  for (auto dollar = text.find('$'); dollar != std::string::npos; dollar = text.find('$', done)) {
+  std::size_t next = 0;
+  for (auto dollar = text.find('$'); dollar != std::string::npos; dollar = text.find('$', next)) {
     const std::string_view rest = std::string_view(text).substr(dollar + 1);
     const std::string* const name = longest_name(rest);
+    next = dollar + 1;
+    if (!name && keeps_names) continue;
     if (!name)
       throw InputError("'$" + std::string(leading_identifier(rest)) +
                        "' has no value; give it one with <default> or on the command line "
@@ -60,7 +64,7 @@ std::string Substitutions::apply(const std::string& text) {
                        (values_.empty() ? "none" : join(keys(values_))) + ")");
     result.append(text, done, dollar - done).append(values_.at(*name));
     unused_defines_.erase(*name);
-    done = dollar + 1 + name->size();
+    next = done = dollar + 1 + name->size();
     if (result.size() > kMaximumLength)
       throw InputError("with its $names replaced, the text is longer than " +
                        std::to_string(kMaximumLength) + " characters");

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "dialect.h"
 #include "driftlight/error.h"
 
 namespace driftlight {
@@ -22,8 +23,10 @@ class Substitutions {
   void add_default(const std::string& name, const std::string& value);
 
   /// The text with every $name replaced by the value of the longest name that fits there, as
-  /// Mitsuba does. Throws InputError on a name without a value, or if the text grows too long.
-  std::string apply(const std::string& text);
+  /// Mitsuba does. Throws InputError on a name without a value, or if the text grows too long. In
+  /// the older dialect a text with a '[' may be an annotation of a film, which has names of its
+  /// own: there those without a value stay.
+  std::string apply(const std::string& text, Dialect dialect);
 
   /// Throws SceneError if the user defined a name that `file` neither uses nor declares.
   void check_defines_used(const std::filesystem::path& file) const;

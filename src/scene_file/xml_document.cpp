@@ -101,7 +101,8 @@ pugi::xml_node XmlDocument::find_id(const std::string& id) const {
 std::optional<std::string> Element::find(const char* attribute) const {
   const pugi::xml_attribute found = node_.attribute(attribute);
   if (!found) return std::nullopt;
-  return with_location(*this, [&] { return surroundings_->substitutions.apply(found.value()); });
+  return with_location(
+      *this, [&] { return surroundings_->substitutions.apply(found.value(), dialect()); });
 }
 
 std::string Element::text(const char* attribute) const {
