@@ -191,6 +191,9 @@ TEST(ObjFile, GroupsAreSmoothedApart) {
   ASSERT_EQ(meshes.size(), 2U);
   for (const auto& normal : meshes[1].normals) expect_near(normal, Eigen::Vector3f(-1, 0, 0));
   EXPECT_EQ(load_meshes("obj", groups, R"(<boolean name="collapse" value="true"/>)").size(), 1U);
+  const std::string index = R"(<integer name="shapeIndex" value=")";
+  expect_near(load_mesh("obj", groups, index + R"(1"/>)").normals.at(0), Eigen::Vector3f(-1, 0, 0));
+  EXPECT_EQ(load_meshes("obj", groups, index + R"(-1"/>)").size(), 2U);
 }
 
 /// Five squares: without a material, red, glass, gold, red again.
@@ -375,6 +378,53 @@ TEST(SerializedFile, ReadsDoublePrecisionWithAllArrays) {
   expect_near(mesh.normals.at(2), Eigen::Vector3f(0, 0, -1));
   expect_near(mesh.uvs.at(1), Eigen::Vector2f(0.3F, 0.4F));
   EXPECT_EQ(mesh.triangles.at(0), (std::array<std::uint32_t, 3>{2, 1, 0}));
+}
+
+/// A triangle of version 5, with one record of these three floats and texture coordinates a vertex.
+std::string packed_triangle(std::uint32_t flags, const Eigen::Vector3f& frame) {
+  std::string bytes;
+  append<std::uint32_t>(bytes, 0x1000 | flags);
+  append<std::uint32_t>(bytes, 4);
+  bytes += "name";
+  append_all<std::uint64_t>(bytes, {3, 1, 2, 1});
+  for (const auto& p :
+       {Eigen::Vector3f(0, 0, 0), Eigen::Vector3f(1, 0, 0), Eigen::Vector3f(0, 1, 0)})
+    append_all<float>(bytes, {p.x(), p.y(), p.z(), frame.x(), frame.y(), frame.z(), p.x(), p.y()});
+  append_all<std::uint32_t>(bytes, {0, 1, 2, 0x80000000U});
+  append_all<std::uint32_t>(bytes, {0, 0, 1, 0, 0, 0});  // distinct positions and normals
+  append<std::uint32_t>(bytes, 2);
+  for (const std::string name : {"face_weight", "vertex_color"}) {
+    append(bytes, static_cast<std::uint32_t>(name.size()));
+    bytes += name + '\0';
+    append<std::uint32_t>(bytes, name == "vertex_color" ? 3 : 1);
+    for (int i = 0; i < (name == "vertex_color" ? 9 : 1); ++i) append(bytes, 0.25F);
+  }
+  return mesh_header(5) + compress_bytes(bytes);
+}
+
+TEST(SerializedFile, ReadsRecordsOfMitsuba3) {
+  constexpr std::uint32_t kNormals = 1, kFrames = 2, kTexCoords = 4, kFlat = 16;
+  const TriangleMesh plain = load_mesh("serialized", packed_triangle(0, {0, 0, 0}));
+  expect_near(plain.positions.at(1), Eigen::Vector3f(1, 0, 0));
+  expect_near(plain.normals.at(0), Eigen::Vector3f(0, 0, 1));  // computed
+  EXPECT_TRUE(plain.uvs.empty());
+  EXPECT_EQ(plain.triangles.at(0), (std::array<std::uint32_t, 3>{0, 1, 2}));
+
+  const TriangleMesh smooth =
+      load_mesh("serialized", packed_triangle(kNormals | kTexCoords, {0, 0.6F, 0.8F}));
+  expect_near(smooth.normals.at(2), Eigen::Vector3f(0, 0.6F, 0.8F));
+  expect_near(smooth.uvs.at(2), Eigen::Vector2f(0, 1));
+
+  // A turn by 90 degrees about x takes z to -y; it is stored as tan(90 / 4 degrees) x.
+  const float turned = std::tan(static_cast<float>(kPi) / 8.0F);
+  const TriangleMesh framed =
+      load_mesh("serialized", packed_triangle(kNormals | kFrames | kTexCoords, {turned, 0, 0}));
+  expect_near(framed.normals.at(0), Eigen::Vector3f(0, -1, 0));
+
+  const std::string flat = packed_triangle(kNormals | kFlat, {0, 0.6F, 0.8F});
+  EXPECT_TRUE(load_mesh("serialized", flat).normals.empty());
+  const std::string shaded = R"(<boolean name="faceNormals" value="false"/>)";
+  EXPECT_FALSE(load_mesh("serialized", flat, shaded).normals.empty());
 }
 
 TEST(SerializedFile, FindsMeshesByIndex) {

@@ -13,6 +13,7 @@ namespace driftlight {
 struct ColoredMesh {
   TriangleMesh mesh;
   std::vector<Eigen::Vector3f> colors;  ///< of the vertices; empty, or one for each
+  bool face_normals = false;            ///< its faces are to look flat
 };
 
 /// Throws InputError if the mesh is empty, or has an index out of range or a number that is not

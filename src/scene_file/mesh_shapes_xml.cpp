@@ -20,13 +20,15 @@ namespace {
 /// Mitsuba 0.6 does either, by the format; Mitsuba 3 always keeps it.
 enum class Mirrored { KeepsOutside, TurnsInsideOut };
 
-/// Properties that all meshes of files share, applied in Mitsuba's order.
-void finish_mesh(Properties& properties, TriangleMesh& mesh, Mirrored mirrored) {
+/// Properties that all meshes of files share, applied in Mitsuba's order. `faceted` is the default
+/// of faceNormals.
+void finish_mesh(Properties& properties, TriangleMesh& mesh, Mirrored mirrored,
+                 bool faceted = false) {
   const Eigen::Affine3d to_world = properties.transform("toWorld");
   transform_mesh(mesh, to_world);
   const bool keep = mirrored == Mirrored::KeepsOutside || properties.dialect() == Dialect::Mitsuba3;
   if (keep && to_world.linear().determinant() < 0.0) reverse_winding(mesh);
-  const bool face_normals = properties.boolean("faceNormals", false);
+  const bool face_normals = properties.boolean("faceNormals", faceted);
   if (properties.has("maxSmoothAngle")) {
     if (face_normals)
       properties.fail("maxSmoothAngle", "give either 'faceNormals' or 'maxSmoothAngle'");
@@ -38,7 +40,7 @@ void finish_mesh(Properties& properties, TriangleMesh& mesh, Mirrored mirrored) 
 /// Likewise of a mesh with colours, which splitting at creases loses.
 ShapePart finish_colored(Properties& properties, ColoredMesh&& file, Mirrored mirrored,
                          LoadContext& context) {
-  finish_mesh(properties, file.mesh, mirrored);
+  finish_mesh(properties, file.mesh, mirrored, file.face_normals);
   if (properties.has("maxSmoothAngle") && !file.colors.empty()) {
     context.notice(properties.element(), "'maxSmoothAngle' loses the colours of the vertices");
     file.colors.clear();
@@ -79,6 +81,19 @@ MaterialLibrary read_materials(const std::filesystem::path& obj, const ObjFile& 
   return result;
 }
 
+/// The property `shapeIndex` of Mitsuba 0.6: of the groups that have faces only one, from 0.
+void take_group(Properties& properties, ObjFile& file) {
+  const int index = properties.integer("shapeIndex", -1);
+  if (index < 0) return;
+  const auto i = static_cast<std::size_t>(index);
+  if (i >= file.parts.size())
+    properties.fail("shapeIndex",
+                    fmt::format("the file has only {} groups with faces", file.parts.size()));
+  ObjFile::Part part = std::move(file.parts[i]);
+  file.parts.clear();
+  file.parts.push_back(std::move(part));
+}
+
 }  // namespace
 
 std::vector<ShapePart> read_obj_shape(Properties& properties, LoadContext& context,
@@ -91,6 +106,7 @@ std::vector<ShapePart> read_obj_shape(Properties& properties, LoadContext& conte
   const bool load_materials = !plain && properties.boolean("loadMaterials", true);
   const std::filesystem::path path = properties.element().find_file(name);
   ObjFile file = with_location(properties.element(), [&] { return read_obj(path, options); });
+  if (!plain) take_group(properties, file);
   const MaterialLibrary materials =
       read_materials(path, file, load_materials, attachments, properties.element(), context);
   if (attachments.radiance && file.parts.size() > 1)

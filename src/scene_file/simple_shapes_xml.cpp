@@ -38,6 +38,8 @@ std::vector<ShapePart> read_rectangle(Properties& properties, LoadContext&, cons
   TriangleMesh mesh;
   append_quad(mesh, quad, properties.transform("toWorld"),
               properties.boolean("flipNormals", false));
+  // In Mitsuba 3 it is a mesh.
+  if (properties.dialect() == Dialect::Mitsuba3) properties.ignore({"faceNormals"});
   return {{mesh}};
 }
 
@@ -52,7 +54,12 @@ std::vector<ShapePart> read_cube(Properties& properties, LoadContext&, const Att
       {Vec3d(1, 1, -1), Vec3d(1, -1, -1), Vec3d(-1, -1, -1), Vec3d(-1, 1, -1)},
   }};
   const Eigen::Affine3d to_world = properties.transform("toWorld");
-  const bool flip = properties.boolean("flipNormals", false);
+  // Its normals are those of its faces anyway. Without them nothing keeps a mirrored cube of
+  // Mitsuba 0.6 from turning inside out.
+  const bool face_normals = properties.boolean("faceNormals", false);
+  const bool turns = face_normals && properties.dialect() != Dialect::Mitsuba3 &&
+                     to_world.linear().determinant() < 0.0;
+  const bool flip = properties.boolean("flipNormals", false) != turns;
   TriangleMesh mesh;
   for (const auto& corners : faces) append_quad(mesh, {corners, uvs}, to_world, flip);
   return {{mesh}};
