@@ -114,6 +114,15 @@ TEST(SceneFile, SaysWhichIntegratorIsNotOurs) {
             std::string::npos);
 }
 
+// Law: emitted and direct light take at most two edges.
+TEST(SceneFile, TheDirectIntegratorTakesTwoEdges) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(complete(R"(<integrator type="direct"/>)"));
+  EXPECT_EQ(loaded.max_depth, 2);
+  ASSERT_EQ(loaded.notices.size(), 1U);
+  expect_contains(loaded.notices[0], "2 edges");
+}
+
 TEST(SceneFile, KeepsTheDepthOfForeignBlocks) {
   const SceneDirectory directory;
   const LoadedScene loaded = directory.load(complete(

@@ -216,9 +216,11 @@ void read_sun(Properties& properties, LoadContext& context) {
 
 void read_sun_and_sky(Properties& properties, LoadContext& context) {
   note_sky(properties, context);
-  if (properties.dialect() == Dialect::Mitsuba3) properties.ignore({"complexSun"});
-  const double sky_scale = properties.non_negative("skyScale", 1.0);
-  add_daylight(properties, context, sky_scale, properties.non_negative("sunScale", 1.0));
+  const bool newer = properties.dialect() == Dialect::Mitsuba3;
+  if (newer) properties.ignore({"complexSun"});
+  const double both = newer ? 1.0 : properties.non_negative("scale", 1.0);
+  const double sky_scale = properties.non_negative("skyScale", both);
+  add_daylight(properties, context, sky_scale, properties.non_negative("sunScale", both));
 }
 
 void reject_area(Properties& properties, LoadContext&) {

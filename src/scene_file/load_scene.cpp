@@ -158,9 +158,16 @@ class SceneLoader {
 
   void read_integrator(const Element& element) {
     Properties properties(element);
-    if (properties.type() != "langevin" && properties.type() != "path")
+    if (properties.type() == "direct") {
+      constexpr int kDirect = 2;
+      max_depth_ = kDirect;
+      context_.notice(element, properties.description() +
+                                   " is not driftlight's; what it renders are paths of up to 2 "
+                                   "edges, which is the depth unless another is given");
+    } else if (properties.type() != "langevin" && properties.type() != "path") {
       context_.notice(element, properties.description() + " is not driftlight's; only its " +
                                    spelling("maxDepth", element.dialect()) + " is used");
+    }
     if (properties.boolean("hideEmitters", false))
       properties.fail("hideEmitters", "hiding emitters is not supported");
     if (const auto depth = properties.find("maxDepth")) set_max_depth(*depth);
