@@ -263,6 +263,20 @@ TEST(Ids, ARefOfTheWrongKindStaysAnError) {
   expect_contains(error_of(lit3(kRedShape + R"(<shape type="disk" id="red"/>)")), "'red'");
 }
 
+TEST(Ids, ShapesReferToAreaEmittersInMitsuba3) {
+  const std::string lamp =
+      R"(<emitter type="area" id="lamp"><rgb name="radiance" value="1, 2, 3"/></emitter>)";
+  const std::string shape = R"(<shape type="sphere"><ref id="lamp"/></shape>)";
+  const SceneDirectory directory;
+  for (const std::string& body : {lamp + shape, shape + lamp}) {
+    const LoadedScene loaded = directory.load(mitsuba3(body + kSensor));
+    ASSERT_EQ(loaded.scene.emitters().size(), 1U);
+    expect_near(std::get<AreaEmitter>(loaded.scene.emitters()[0]).radiance, Rgbd(1, 2, 3));
+  }
+  expect_contains(error_of(mitsuba3(lamp + kShape + kSensor)), "no emitter");
+  expect_contains(error_of(lit(lamp)), "inside of a shape");
+}
+
 TEST(Ids, AliasesAreSecondNames) {
   const std::string definition = R"(<bsdf type="diffuse" id="a"/><alias id="a" as="red"/>)";
   const SceneDirectory directory;
@@ -288,6 +302,69 @@ TEST(Files, AreLookedForInPathsAndBesideTheFileThatNamesThem) {
       lit3(R"(<path value="meshes"/><include filename="parts/part.xml"/>)" + mesh("a.obj")));
   EXPECT_EQ(loaded.scene.shapes().size(), 2U);
   expect_contains(error_of(lit3(R"(<path value="absent"/>)")), "absent");
+}
+
+/// A file of Mitsuba 3 with this outermost element.
+std::string outermost3(std::string element) {
+  return element.insert(element.find_first_of(" >"), " version=\"3.0.0\"");
+}
+
+TEST(Includes, MayBeOneObjectInMitsuba3) {
+  const SceneDirectory directory;
+  directory.write("red.xml", outermost3(R"(<bsdf type="diffuse" id="red">
+      <rgb name="reflectance" value="0.9, 0, 0"/></bsdf>)"));
+  const std::string body = R"(<include filename="red.xml"/>)" + kRedShape;
+  const LoadedScene loaded = directory.load(lit3(body));
+  expect_near(std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance.color, Rgbd(0.9, 0, 0));
+  expect_contains(test::scene_error([&] { directory.load(lit(body)); }), "must be <scene>");
+  directory.write("red.xml", outermost3("<point name=\"p\"/>"));
+  expect_contains(test::scene_error([&] { directory.load(lit3(body)); }), "an object such as");
+}
+
+TEST(Includes, MayStandInObjectsInMitsuba3) {
+  const SceneDirectory directory;
+  std::filesystem::create_directories(directory.path() / "parts");
+  directory.write("parts/paint.xml", outermost3(R"(<texture type="checkerboard">
+      <rgb name="color0" value="0.9"/></texture>)"));
+  directory.write("parts/painted.xml", outermost3(R"(<bsdf type="diffuse">
+      <include name="reflectance" filename="paint.xml"/></bsdf>)"));
+  directory.write(
+      "parts/lamp.xml",
+      mitsuba3(R"(<emitter type="area"><rgb name="radiance" value="$power"/></emitter>)"));
+  directory.write("film.xml", outermost3(R"(<film type="hdrfilm"><integer name="width" value="20"/>
+      <rfilter type="box"/></film>)"));
+  const LoadedScene loaded = directory.load(mitsuba3(
+      R"(<default name="power" value="4"/>
+         <shape type="rectangle"><include filename="parts/painted.xml"/>
+           <include filename="parts/lamp.xml"/></shape>
+         <sensor type="perspective"><include filename="film.xml"/></sensor>)"));
+  EXPECT_EQ(loaded.scene.camera().film_width, 20);
+  const Texture& paint = std::get<Diffuse>(loaded.scene.bsdfs()[0]).reflectance;
+  ASSERT_TRUE(paint.pattern.has_value());
+  expect_near(paint.pattern->color0, Rgbd(0.9, 0.9, 0.9));
+  expect_near(std::get<AreaEmitter>(loaded.scene.emitters()[0]).radiance, Rgbd(4, 4, 4));
+}
+
+TEST(Includes, InObjectsSayWhatIsWrong) {
+  const SceneDirectory directory;
+  const auto error = [&](const std::string& part) {
+    directory.write("part.xml", part);
+    return test::scene_error([&] {
+      directory.load(lit3(R"(<shape type="sphere"><include filename="part.xml"/></shape>)"));
+    });
+  };
+  expect_contains(
+      error(outermost3(R"(<bsdf type="twosided"><include filename="part.xml"/></bsdf>)")),
+      "cyclic");
+  expect_contains(error(mitsuba3(R"(<float name="radius" value="2"/>)")),
+                  "part.xml:2:1: <float> is not supported");
+  expect_contains(error(outermost3(R"(<bsdf type="velvet"/>)")), "part.xml:1:1: ");
+  expect_contains(error(R"(<bsdf type="diffuse"/>)"), "'version'");
+  std::string deep = R"(<bsdf type="diffuse"/>)";
+  for (int i = 0; i < 30; ++i) deep = R"(<bsdf type="mask">)" + deep + "</bsdf>";
+  expect_contains(error(outermost3(deep)), "levels deep");
+  expect_contains(error_of(lit(R"(<shape type="sphere"><include filename="part.xml"/></shape>)")),
+                  "<include>");
 }
 
 // --- Colours -------------------------------------------------------------------------------------

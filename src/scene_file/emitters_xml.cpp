@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "bsdfs_xml.h"
 #include "color_xml.h"
 #include "daylight.h"
 #include "properties.h"
@@ -243,14 +244,33 @@ constexpr std::array<std::pair<std::string_view, EmitterReader>, 9> kEmitters{{
 }  // namespace
 
 void read_emitter(const Element& element, LoadContext& context) {
+  if (context.objects.is_read(element)) return;
   Properties properties(element);
+  // It lights up where a shape refers to it.
+  if (properties.type() == "area" && element.dialect() == Dialect::Mitsuba3) {
+    read_area_radiance(element, context);
+    return;
+  }
   find_plugin(kEmitters, properties)(properties, context);
   properties.ignore({"samplingWeight"});
   properties.finish();
+  context.has_emitter = true;
   context.objects.define(element, NamedObjects::Other{});
 }
 
+bool is_area_emitter(const Element& element, LoadContext& context) {
+  if (element.tag() == "emitter") return true;
+  if (element.tag() != "ref" || element.dialect() != Dialect::Mitsuba3) return false;
+  context.objects.read_ahead(element, "emitter",
+                             [&](const Element& target) { read_emitter(target, context); });
+  context.objects.read_ahead(element, "bsdf",
+                             [&](const Element& target) { read_surface(target, context); });
+  return context.objects.names<NamedObjects::Radiance>(element);
+}
+
 Texture read_area_radiance(const Element& element, LoadContext& context) {
+  if (element.tag() == "ref")
+    return context.objects.resolve<NamedObjects::Radiance>(element, "area emitter").texture;
   Properties properties(element);
   if (properties.type() != "area")
     element.fail("unknown " + properties.description() + " in a shape; valid are: area");
@@ -259,7 +279,7 @@ Texture read_area_radiance(const Element& element, LoadContext& context) {
     properties.fail("radiance", "vertex colours cannot be a radiance");
   properties.ignore({"samplingWeight"});
   properties.finish();
-  context.objects.define(element, NamedObjects::Other{});
+  context.objects.define(element, NamedObjects::Radiance{radiance});
   return radiance;
 }
 

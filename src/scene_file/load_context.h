@@ -48,8 +48,12 @@ class NamedObjects {
  public:
   /// Something with an id that no <ref> may ask for.
   struct Other {};
-  using Object =
-      std::variant<Other, std::shared_ptr<Surface>, std::shared_ptr<const ShapeGroup>, Texture>;
+  /// <emitter type="area">
+  struct Radiance {
+    Texture texture;
+  };
+  using Object = std::variant<Other, std::shared_ptr<Surface>, std::shared_ptr<const ShapeGroup>,
+                              Texture, Radiance>;
 
   /// Registers the element if it has an id. Throws SceneError if the id is taken.
   void define(const Element& element, Object object);

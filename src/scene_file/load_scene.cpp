@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
-#include <memory>
 
 #include "bsdfs_xml.h"
 #include "driftlight/scene_file.h"
 #include "emitters_xml.h"
+#include "included_files.h"
 #include "load_context.h"
 #include "properties.h"
 #include "sensor_xml.h"
@@ -16,21 +16,11 @@
 namespace driftlight {
 namespace {
 
-/// Files that include others several times each could go on for ever.
-constexpr std::size_t kMaximumIncludes = 1000;
-
 /// Elements that Mitsuba knows but we do not: they would change the picture.
 constexpr std::array kUnsupported{"subsurface", "medium",  "volume",   "phase", "animation",
                                   "film",       "sampler", "rfilter",  "ref",   "boolean",
                                   "float",      "integer", "string",   "rgb",   "spectrum",
                                   "point",      "vector",  "transform"};
-
-/// True if the element contains one with the tag.
-bool contains(const Element& element, std::string_view tag) {
-  const std::vector<Element> children = element.children();
-  return std::any_of(children.begin(), children.end(),
-                     [&](const Element& child) { return child.tag() == tag; });
-}
 
 /// True if a spectrum in the element is a list of wavelengths or a file of such.
 bool has_wavelengths(const Element& element) {
@@ -47,41 +37,28 @@ class SceneLoader {
  public:
   SceneLoader(const std::filesystem::path& file, const LoadOptions& options)
       : file_(file),
+        document_(file),
         context_{{Substitutions(options.defines), SearchPath(file.parent_path())}, {}, {}, {}} {}
 
   LoadedScene load() {
-    const Element root = read_file(file_);
+    const Element root = open_scene(document_, context_.surroundings);
+    read_scene(root);
     context_.surroundings.substitutions.check_defines_used(file_);
     if (!has_sensor_) root.fail("the scene has no sensor");
     if (context_.shape_count == 0) root.fail("the scene has no shape");
-    if (!has_emitter_) root.fail("the scene has no emitter");
+    if (!context_.has_emitter) root.fail("the scene has no emitter");
     Scene scene = with_location(root, [&] { return context_.builder.build(); });
     return {std::move(scene), max_depth_, std::move(context_.notices), context_.tone_mapping};
   }
 
  private:
-  /// Reads all elements of a file, which stays in memory as long as the loader lives. Returns its
-  /// outermost element.
-  Element read_file(const std::filesystem::path& file) {
-    documents_.push_back(std::make_unique<XmlDocument>(file));
-    XmlDocument& document = *documents_.back();
-    const Element scene(document, document.root(), context_.surroundings);
-    if (scene.tag() != "scene") scene.fail("the outermost element must be <scene>");
-    scene.allow_attributes({"version", "id"});
-    const std::string version = scene.text("version");
-    const std::optional<Dialect> dialect = dialect_of(version);
-    if (!dialect)
-      scene.fail("scene version '" + version +
-                 "' is not supported; valid are: 0.5.x, 0.6.x, 2.x.x, 3.x.x");
-    document.set_dialect(*dialect);
-    open_files_.push_back(file);
+  /// Reads all elements of a <scene>.
+  void read_scene(const Element& scene) {
     for (const Element& element : scene.children()) read(element);
-    open_files_.pop_back();
-    if (has_backward_spectra(version) && has_wavelengths(scene))
+    if (has_backward_spectra(scene.version()) && has_wavelengths(scene))
       context_.notice(scene,
                       "spectra are interpolated as Mitsuba 0.5 did, between two samples from "
                       "the wrong ends; version=\"0.6.0\" has straight lines");
-    return scene;
   }
 
   void read(const Element& element) {
@@ -105,10 +82,8 @@ class SceneLoader {
       read_texture(element, context_);
     } else if (tag == "emitter") {
       read_emitter(element, context_);
-      has_emitter_ = true;
     } else if (tag == "shape") {
       read_shape(element, context_);
-      has_emitter_ |= contains(element, "emitter");
     } else {
       read_other(element);
     }
@@ -123,17 +98,11 @@ class SceneLoader {
 
   /// Reads another file as if its elements stood here.
   void read_include(const Element& element) {
-    element.allow_attributes({"filename"});
-    const std::filesystem::path file = element.find_file(element.text("filename"));
-    if (!std::filesystem::exists(file))
-      element.fail("the file '" + file.string() + "' does not exist");
-    const bool cyclic = std::any_of(open_files_.begin(), open_files_.end(), [&](const auto& other) {
-      return std::filesystem::equivalent(file, other);
-    });
-    if (cyclic) element.fail("cyclic include: '" + file.string() + "' includes itself");
-    if (documents_.size() > kMaximumIncludes)
-      element.fail("more than " + std::to_string(kMaximumIncludes) + " files are included");
-    read_file(file);
+    const Element root = included_root(element);
+    if (root.tag() == "scene")
+      read_scene(root);
+    else
+      read(root);
   }
 
   /// A directory in which other files are looked for, too.
@@ -199,12 +168,10 @@ class SceneLoader {
   }
 
   std::filesystem::path file_;
-  std::vector<std::unique_ptr<XmlDocument>> documents_;
-  std::vector<std::filesystem::path> open_files_;  ///< the outermost first
+  XmlDocument document_;
   LoadContext context_;
   std::optional<int> max_depth_;
   bool has_sensor_ = false;
-  bool has_emitter_ = false;
 };
 
 }  // namespace

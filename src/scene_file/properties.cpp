@@ -8,6 +8,7 @@
 #include <set>
 
 #include "color_xml.h"
+#include "included_files.h"
 #include "text.h"
 #include "transform_xml.h"
 
@@ -15,13 +16,16 @@ namespace driftlight {
 
 Properties::Properties(const Element& element)
     : element_(element), type_(lower_case(element.find("type").value_or(""))) {
-  element.allow_attributes({"type", "id", "name"});
+  if (element.is_outermost())
+    element.allow_attributes({"version", "type", "id", "name"});
+  else
+    element.allow_attributes({"type", "id", "name"});
   std::set<std::string> seen;
-  for (const Element& child : element.children()) {
-    const std::string name = snake_case(child.find("name").value_or(""));
+  for (const Content& content : contents_of(element)) {
+    const std::string name = snake_case(content.name);
     if (!name.empty() && !seen.insert(name).second)
-      child.fail(fmt::format("'{}' is given twice in {}", child.text("name"), description()));
-    children_.push_back({child, name});
+      content.element.fail(fmt::format("'{}' is given twice in {}", content.name, description()));
+    children_.push_back({content.element, name});
   }
 }
 
@@ -45,8 +49,8 @@ std::optional<Element> Properties::find(std::string_view name,
                                         const std::vector<std::string>& tags) {
   const std::optional<Element> child = find(name);
   if (child && std::find(tags.begin(), tags.end(), child->tag()) == tags.end())
-    child->fail(fmt::format("'{}' of {} must be <{}>, not <{}>", child->text("name"), description(),
-                            tags.front(), child->tag()));
+    child->fail(fmt::format("'{}' of {} must be <{}>, not <{}>", spelling(name, dialect()),
+                            description(), tags.front(), child->tag()));
   return child;
 }
 
@@ -171,7 +175,7 @@ void Properties::finish() const {
     if (child.name.empty())
       child.element.fail("<" + child.element.tag() + "> is not supported in " + description());
     child.element.fail(fmt::format("unknown property '{}' of {}; valid are: {}",
-                                   child.element.text("name"), description(),
+                                   child.element.find("name").value_or(child.name), description(),
                                    names_.empty() ? "none" : join(names_)));
   }
 }

@@ -98,6 +98,12 @@ pugi::xml_node XmlDocument::find_id(const std::string& id) const {
   return found == ids_.end() ? pugi::xml_node() : found->second;
 }
 
+std::string Element::parent_tag() const {
+  const XmlDocument* const including = document_->including();
+  if (!is_outermost() || including == nullptr) return node_.parent().name();
+  return Element(*including, document_->include(), *surroundings_).parent_tag();
+}
+
 std::optional<std::string> Element::find(const char* attribute) const {
   const pugi::xml_attribute found = node_.attribute(attribute);
   if (!found) return std::nullopt;

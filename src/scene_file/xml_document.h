@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <initializer_list>
 #include <map>
+#include <memory>
 #include <optional>
 #include <pugixml.hpp>
 #include <string>
@@ -33,7 +34,15 @@ class XmlDocument {
   pugi::xml_node root() const { return document_.document_element(); }
   Dialect dialect() const { return dialect_; }
   void set_dialect(Dialect dialect) { dialect_ = dialect; }
-  std::filesystem::path directory() const { return std::filesystem::path(name_).parent_path(); }
+  std::filesystem::path file() const { return name_; }
+  std::filesystem::path directory() const { return file().parent_path(); }
+  /// The file in which this one is included, and the element that does it; none of the main file.
+  const XmlDocument* including() const { return including_; }
+  pugi::xml_node include() const { return include_; }
+  void set_include(const XmlDocument& including, pugi::xml_node include) {
+    including_ = &including;
+    include_ = include;
+  }
   /// Of the '<' that opens the element.
   SourceLocation location(pugi::xml_node node) const;
   /// The first element with this id, as written.
@@ -50,12 +59,16 @@ class XmlDocument {
   pugi::xml_document document_;
   std::map<std::string, pugi::xml_node> ids_;
   Dialect dialect_ = Dialect::Mitsuba06;
+  const XmlDocument* including_ = nullptr;
+  pugi::xml_node include_;
 };
 
 /// What the texts of attributes mean depends on these, which change as elements are read.
 struct Surroundings {
   Substitutions substitutions;
   SearchPath search_path;
+  /// By the nodes of the elements that include them.
+  std::map<const void*, std::unique_ptr<XmlDocument>> included = {};
 };
 
 /// One element; attributes are read after substitution of $names.
@@ -65,8 +78,13 @@ class Element {
       : document_(&document), node_(node), surroundings_(&surroundings) {}
 
   std::string tag() const { return node_.name(); }
-  /// Tag of the element around this one; empty if there is none.
-  std::string parent_tag() const { return node_.parent().name(); }
+  /// Tag of the element around this one, or around what includes its file; empty if there is none.
+  std::string parent_tag() const;
+  /// True if it is not within another element of its file.
+  bool is_outermost() const { return node_ == document_->root(); }
+  const XmlDocument& document() const { return *document_; }
+  pugi::xml_node node() const { return node_; }
+  Surroundings& surroundings() const { return *surroundings_; }
   Dialect dialect() const { return document_->dialect(); }
   /// Of the file, as its outermost element says.
   std::string version() const {
