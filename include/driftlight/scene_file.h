@@ -24,8 +24,9 @@ struct LoadedScene {
   /// Longest path in edges, from the file's integrator. None: not given or unbounded (-1).
   std::optional<int> max_depth;
   /// Things the user should know, each "file:line:column: ..": an integrator that is not ours, a
-  /// sampler that is not used, a filter that is replaced, and so on. Nothing in it changes the
-  /// picture by more than a blur of a pixel or the digits of a table.
+  /// sampler that is not used, a filter that is replaced, and so on. Few change the picture by more
+  /// than a blur of a pixel or the digits of a table: other models of the sky, normals that Mitsuba
+  /// 3 would flip or dim, the opacity of glass in .mtl files, the channels of the image.
   std::vector<std::string> notices;
   /// Of an ldrfilm, for files of 8-bit values.
   ToneMapping tone_mapping = {};
