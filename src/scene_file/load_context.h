@@ -122,7 +122,7 @@ struct LoadContext {
   std::size_t shape_count = 0;
   std::size_t instanced_triangles = 0;
   bool has_emitter = false;
-  /// Decoded as sRGB, since neither the scene nor the file says anything else.
+  /// Decoded as sRGB, though the scene does not ask for it.
   std::set<std::shared_ptr<const Bitmap>> assumed_srgb = {};
 
   void notice(const Element& element, const std::string& message) {

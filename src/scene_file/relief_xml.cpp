@@ -41,7 +41,7 @@ Surface read_relief(Properties& properties, LoadContext& context, Relief relief)
   if (context.assumed_srgb.contains(texture->bitmap))
     context.notice(
         properties.element(),
-        fmt::format("the image of {} is decoded as sRGB, as nothing is said of it; {} "
+        fmt::format("the image of {} is decoded as sRGB, as nothing else is asked for; {} "
                     "takes its values as they are, which most such images want",
                     properties.description(),
                     properties.dialect() == Dialect::Mitsuba3 ? "the boolean 'raw' as true"
