@@ -242,8 +242,8 @@ constexpr std::array<std::pair<std::string_view, EmitterReader>, 9> kEmitters{{
 
 void read_emitter(const Element& element, LoadContext& context) {
   Properties properties(element);
-  find_plugin(kEmitters, properties)(properties, context);
   properties.ignore({"samplingWeight"});
+  find_plugin(kEmitters, properties)(properties, context);
   properties.finish();
   context.objects.define(element, NamedObjects::Other{});
 }

@@ -25,7 +25,7 @@ class Substitutions {
   /// Mitsuba does. Throws InputError on a name without a value, or if the text grows too long.
   std::string apply(const std::string& text);
 
-  /// Throws SceneError if the user defined a name that `file` neither uses nor declares.
+  /// Throws SceneError naming all that the user defined and that `file` neither uses nor declares.
   void check_defines_used(const std::filesystem::path& file) const;
 
  private:
@@ -33,6 +33,7 @@ class Substitutions {
 
   std::map<std::string, std::string> values_;
   std::set<std::string> unused_defines_;
+  std::set<std::string> declared_;  ///< names that the scene uses or has a <default> for
 };
 
 }  // namespace driftlight

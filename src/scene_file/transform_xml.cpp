@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "driftlight/scalar.h"
+#include "nearest_names.h"
 
 namespace driftlight {
 namespace {
@@ -89,8 +90,8 @@ Eigen::Affine3d read_step(const Element& element) {
   if (tag == "scale") return read_scale(element);
   if (tag == "lookat" || tag == "lookAt") return read_look_at(element);
   if (tag == "matrix") return read_matrix(element);
-  element.fail("unknown transform <" + tag +
-               ">; valid are: translate, rotate, scale, lookat, matrix");
+  element.fail("unknown transform <" + tag + ">; " +
+               hint(tag, {"translate", "rotate", "scale", "lookat", "matrix"}));
 }
 
 }  // namespace
