@@ -258,6 +258,14 @@ TEST(UnusedProperties, OfIntegratorsThatMitsubaKnowsAreInOneNotice) {
   expect_contains(notices[0], "rrDepth, strictNormals of integrator 'path' are not used");
   const SceneDirectory directory;
   EXPECT_EQ(directory.load(scene, {.defines = {}, .strict = true}).max_depth, 7);
+
+  const auto other = [](const std::string& name) {
+    return complete(R"(<integrator type="guided_path"><string name="budgetType" value="spp"/>
+        <integer name=")" +
+                    name + R"(" value="7"/></integrator>)");
+  };
+  EXPECT_EQ(directory.load(other("maxDepth"), {.defines = {}, .strict = true}).max_depth, 7);
+  expect_contains(error_of(other("maxdepht"), true), "did you mean 'maxDepth'?");
 }
 
 // --- Several errors ------------------------------------------------------------------------------

@@ -3,100 +3,47 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "nearest_names.h"
 #include "properties.h"
 #include "text.h"
 
 namespace driftlight {
 namespace {
 
-/// What Mitsuba's integrators know besides: how they sample, and what we have options for.
-constexpr std::array<std::string_view, 64> kUnusedParameters{"rrDepth",
-                                                             "strictNormals",
-                                                             "shadingSamples",
-                                                             "emitterSamples",
-                                                             "bsdfSamples",
-                                                             "rayLength",
-                                                             "lightImage",
-                                                             "sampleDirect",
-                                                             "bidirectional",
-                                                             "bidirectionalMutation",
-                                                             "lensPerturbation",
-                                                             "multiChainPerturbation",
-                                                             "causticPerturbation",
-                                                             "manifoldPerturbation",
-                                                             "lambda",
-                                                             "pLarge",
-                                                             "pSurvival",
-                                                             "directSamples",
-                                                             "luminanceSamples",
-                                                             "separateDirect",
-                                                             "twoStage",
-                                                             "firstStage",
-                                                             "firstStageSizeReduction",
-                                                             "timeout",
-                                                             "workUnits",
-                                                             "mutationSizeLow",
-                                                             "mutationSizeHigh",
-                                                             "technique",
-                                                             "kelemenStyleMutations",
-                                                             "kelemenStyleWeights",
-                                                             "numChains",
-                                                             "maxChains",
-                                                             "chainLength",
-                                                             "granularity",
-                                                             "globalPhotons",
-                                                             "causticPhotons",
-                                                             "volumePhotons",
-                                                             "photonCount",
-                                                             "maxPasses",
-                                                             "initialRadius",
-                                                             "reductionRatio",
-                                                             "alpha",
-                                                             "globalLookupRadius",
-                                                             "causticLookupRadius",
-                                                             "lookupSize",
-                                                             "gatherLocally",
-                                                             "autoCancelGathering",
-                                                             "directTracing",
-                                                             "clamping",
-                                                             "shadowMapResolution",
-                                                             "maxError",
-                                                             "pValue",
-                                                             "maxSampleFactor",
-                                                             "resolution",
-                                                             "quality",
-                                                             "gradients",
-                                                             "overture",
-                                                             "indirectOnly",
-                                                             "stokes",
-                                                             "samplesPerPass",
-                                                             "blockSize",
-                                                             "aovs",
-                                                             "field",
-                                                             "dimensions"};
+constexpr std::array<std::string_view, 2> kUsed{"maxDepth", "hideEmitters"};
 
-/// Ours, or with the same picture.
-bool is_ours(const Properties& properties) {
-  return properties.type() == "langevin" || properties.type() == "path";
-}
+/// What Mitsuba's path tracer knows besides.
+constexpr std::array<std::string_view, 5> kUnusedOfPath{"rrDepth", "strictNormals",
+                                                        "samplesPerPass", "blockSize", "timeout"};
 
-void note_unused(Properties& properties, LoadContext& context) {
+void note_unused_of_path(Properties& properties, LoadContext& context) {
   std::vector<std::string> unused;
-  for (const std::string_view name : kUnusedParameters)
+  for (const std::string_view name : kUnusedOfPath)
     if (properties.has(name)) unused.push_back(spelling(name, properties.dialect()));
-  if (!is_ours(properties))
-    context.notice(properties.element(),
-                   properties.description() + " is not driftlight's; only its " +
-                       spelling("maxDepth", properties.dialect()) + " is used");
-  else if (!unused.empty())
+  if (!unused.empty())
     context.notice(properties.element(),
                    fmt::format("{} of {} {} not used", join(unused), properties.description(),
                                unused.size() == 1 ? "is" : "are"));
+}
+
+/// One notice is enough of whatever the integrators of others know, but for what may be a slip of
+/// what is used.
+void note_other(Properties& properties, LoadContext& context) {
+  context.notice(properties.element(), properties.description() +
+                                           " is not driftlight's; only its " +
+                                           spelling("maxDepth", properties.dialect()) + " is used");
+  for (const Element& child : properties.unused()) {
+    const std::string name = child.find("name").value_or("");
+    const bool may_be_slip = std::any_of(
+        kUsed.begin(), kUsed.end(), [&](std::string_view used) { return is_slip(name, used); });
+    if (!name.empty() && !may_be_slip) properties.ignore({name});
+  }
 }
 
 }  // namespace
@@ -107,8 +54,13 @@ std::optional<std::optional<int>> read_integrator(const Element& element, LoadCo
   if (properties.boolean("hideEmitters", false))
     properties.fail("hideEmitters", "hiding emitters is not supported");
   if (const auto depth = properties.find("maxDepth")) result = read_max_depth(*depth);
-  note_unused(properties, context);
-  for (const Element& nested : properties.nested({"integrator"}))
+  const std::vector<Element> nested_integrators = properties.nested({"integrator"});
+  const bool is_ours = properties.type() == "langevin" || properties.type() == "path";
+  if (is_ours)
+    note_unused_of_path(properties, context);
+  else
+    note_other(properties, context);
+  for (const Element& nested : nested_integrators)
     if (const auto depth = read_integrator(nested, context)) result = depth;
   properties.finish();
   context.objects.define(element, NamedObjects::Other{});
@@ -116,6 +68,7 @@ std::optional<std::optional<int>> read_integrator(const Element& element, LoadCo
 }
 
 std::optional<int> read_max_depth(const Element& element) {
+  element.allow_attributes({"name", "value"});
   const std::optional<int> depth = parse_integer(element.text("value"));
   if (!depth || *depth == 0 || *depth < -1)
     element.fail("the depth must be a positive integer, or -1 for no bound");

@@ -56,6 +56,9 @@ class Properties {
   /// Identity if there is none.
   Eigen::Affine3d transform(std::string_view name);
 
+  /// The children that were not asked for.
+  std::vector<Element> unused() const;
+
   /// Says of each child that was not asked for that it is not used, with the names nearest to its
   /// own of all that were. Throws SceneError if Mitsuba would use it and the picture would change.
   void finish() const;
@@ -70,8 +73,6 @@ class Properties {
     bool used = false;
   };
 
-  /// The children that were not asked for.
-  std::vector<Element> unused() const;
   std::optional<Vec3d> coordinates(std::string_view name, const std::string& tag);
   /// The child with this name, which must have one of the tags.
   std::optional<Element> find(std::string_view name, const std::vector<std::string>& tags);
