@@ -246,6 +246,7 @@ TEST(ObjFile, TheSceneMayNameItsMaterials) {
   EXPECT_TRUE(std::holds_alternative<Diffuse>(bsdfs[2]));
   EXPECT_TRUE(std::holds_alternative<Conductor>(bsdfs[3]));
   expect_contains(named.notices.back(), "'blue'");
+  expect_contains(named.notices.at(2), "material 'wine glass'");
   for (const Bsdf& bsdf : fronts(load_painted(directory, R"(<bsdf type="plastic"/>)").scene))
     EXPECT_TRUE(std::holds_alternative<Plastic>(bsdf));
   const std::string off = R"(<boolean name="loadMaterials" value="false"/>)";
@@ -276,7 +277,7 @@ TEST(ObjFile, SaysWhatIsWrongWithALibrary) {
 // Smooth glass under a mask would have two ways to transmit.
 TEST(ObjFile, GlassOfALibraryHasNoOpacity) {
   const SceneDirectory directory;
-  directory.write("some.mtl", "newmtl red\n\nnewmtl wine glass\nillum 4\nd 0.5\n");
+  directory.write("some.mtl", "newmtl red\n\nnewmtl wine glass\nillum 4\nd 0.5\nnewmtl gold\n");
   const LoadedScene loaded = load_painted(directory);
   EXPECT_TRUE(std::holds_alternative<Dielectric>(fronts(loaded.scene)[2]));
   ASSERT_EQ(loaded.notices.size(), 1U);
@@ -288,12 +289,83 @@ TEST(ObjFile, RefusesBadFiles) {
   expect_contains(mesh_error("obj", ""), "no faces");
   expect_contains(mesh_error("obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n"), "vertex 3");
   expect_contains(mesh_error("obj", "v 0 0 0\nf 1 1 -2\n"), "vertex -2");
-  expect_contains(mesh_error("obj", "v 0 0 0\nf a b c\n"), "vertex 0");
+  expect_contains(mesh_error("obj", "v 0 0 0\nf 0 1 1\n"), "vertex 0");
   expect_contains(mesh_error("obj", "v 0 0 0\nf 1//2 1//2 1//2\n"), "normal 2");
   expect_contains(mesh_error("obj", "v 0 0 0\nf 1/5 1/5 1/5\n"), "texture coordinate 5");
   expect_contains(mesh_error("obj", "v 0 0 0\nf 1 1\n"), "three corners");
   expect_contains(mesh_error("obj", "v 1e999 0 0\nf 1 1 1\n"), "finite");
-  expect_contains(mesh_error("obj", "v 0 0 0\nvn 0 0 1\nf 1//1 1//1 1//1\nf 1 1 1\n"), "normals");
+}
+
+TEST(ObjFile, NamesTheLineThatIsWrong) {
+  const std::string start = "# made by hand\nv 0 0 0\r\nv 1 0 0\n\nv 0 1 0\n";
+  const auto error = [&](const std::string& line) {
+    const std::string text = mesh_error("obj", start + line + "\nf 1 2 3\n");
+    expect_contains(text, "mesh:6: ");
+    expect_contains(text, "\n    6 | " + line);
+    return text;
+  };
+  expect_contains(error("f 1 2 9"), "vertex 9, but there are only 3");
+  expect_contains(error("f 1/1 2/1 3/1"), "texture coordinate 1, but there are only 0");
+  expect_contains(error("f 1 2"), "three corners");
+  expect_contains(error("f 1 2 3x"), "'3x'");
+  expect_contains(error("f 1/2/3/4 2 3"), "'1/2/3/4'");
+  expect_contains(error("f"), "three corners");
+  expect_contains(error("v 1 oops 0"), "'oops' is not a number");
+  expect_contains(error("v 1 2"), "needs 3 numbers, not 2");
+  expect_contains(error("v 1.2.3 0 0"), "'1.2.3'");
+  expect_contains(error("v 1 0 -"), "'-'");
+  expect_contains(error("v 1 0 3e"), "'3e'");
+  expect_contains(error("v nan 0 0"), "'nan'");
+  expect_contains(error("vn 0 1"), "'vn' needs 3 numbers");
+  expect_contains(error("vt"), "'vt' needs 1 numbers");
+  expect_contains(error("bogus line"), "unknown statement 'bogus'");
+  expect_contains(error("usemtll red"), "did you mean 'usemtl'?");
+  expect_contains(mesh_error("obj", start + "v 1e99 0 0\nf 1 2 4\n"), "mesh:6: '1e99'");
+}
+
+TEST(ObjFile, RefusesZerosInItsText) {
+  std::string file = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  file[file.find('\n')] = '\0';
+  expect_contains(mesh_error("obj", file), "mesh:1: ");
+}
+
+// Pieces do not know their lines.
+TEST(ObjFile, NamesALineFarDown) {
+  std::string file = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  for (int i = 0; i < 50000; ++i) file += "f 1 2 3\n";
+  expect_contains(mesh_error("obj", file + "f 1 2 4\n"), "mesh:50004: a face refers to vertex 4");
+  expect_contains(mesh_error("obj", file + "f 1 2 c\n"), "mesh:50004: 'c'");
+}
+
+TEST(ObjFile, IgnoresOtherStatements) {
+  const TriangleMesh mesh = load_mesh(
+      "obj",
+      "\xEF\xBB\xBF# BOM\n  \t\nmtllib none.mtl\no thing\ns off\nv 0 0 0 1.0\nv +1. .0 -0E+1 # a\n"
+      "v 0 1 0 0.5 0.5 0.5\nvp 0.1\nl 1 2\np 1\ncstype bezier\ndeg 3\ncurv 0 1 1 2\nend\n"
+      "lod 3\nf 1 2 3\r\n");
+  EXPECT_EQ(mesh.triangles.size(), 1U);
+  EXPECT_EQ(mesh.positions.size(), 3U);
+}
+
+// A square with normals of its own and one without, at a right angle.
+TEST(ObjFile, SmoothsWhereNormalsAreMissing) {
+  const SceneDirectory directory;
+  directory.write("mesh",
+                  "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 -1\nv 0 1 -1\nvn 0.6 0 0.8\n"
+                  "f 1//1 2//1 3//1 4//1\nf 5 1 4 6\n");
+  const auto load = [&](const std::string& content) {
+    return directory.load(lit(shape_element("obj", content)));
+  };
+  const LoadedScene loaded = load("");
+  const auto& mesh = std::get<TriangleMesh>(loaded.scene.shapes()[0].geometry);
+  ASSERT_EQ(mesh.positions.size(), 8U);
+  for (std::size_t t = 0; t < 4; ++t)
+    for (const std::uint32_t vertex : mesh.triangles[t])
+      expect_near(mesh.normals[vertex],
+                  t < 2 ? Eigen::Vector3f(0.6F, 0, 0.8F) : Eigen::Vector3f(-1, 0, 0));
+  ASSERT_EQ(loaded.notices.size(), 1U);
+  expect_contains(loaded.notices[0], "4 vertices of 'mesh' have no normal");
+  EXPECT_TRUE(load(kFaceNormals).notices.empty());
 }
 
 // --- serialized ----------------------------------------------------------------------------------

@@ -157,8 +157,6 @@ TEST(FilmXml, SkipsAnnotations) {
          <string name="metadata['Author']" value="nobody"/></film>)");
   ASSERT_EQ(loaded.notices.size(), 1U);
   expect_contains(loaded.notices[0], "label[10, 10], metadata['Author']");
-  EXPECT_THROW(load_with(R"(<film type="hdrfilm"><string name="labels" value="x"/></film>)"),
-               SceneError);
   EXPECT_THROW(
       load_with(R"(<film type="hdrfilm"><string name="label[1,1]" value="$scene"/></film>)"),
       SceneError);

@@ -69,6 +69,11 @@ TEST(BitmapXml, ReadsFilters) {
   EXPECT_TRUE(texture_of(bitmap("")).interpolates);
 }
 
+TEST(BitmapXml, RefusesSingleChannels) {
+  expect_contains(error_of(bitmap(R"(<string name="channel" value="r"/>)")),
+                  "'channel' is not supported in texture 'bitmap'");
+}
+
 TEST(BitmapXml, LeavesRawFilesAsTheyAre) {
   const Texture raw = texture_of(bitmap(R"(<boolean name="raw" value="true"/>)"), "3.0.0");
   EXPECT_NEAR(raw.bitmap->at(0, 0).x(), 128.0 / 255.0, 1e-6);

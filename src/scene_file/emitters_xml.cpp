@@ -251,8 +251,8 @@ void read_emitter(const Element& element, LoadContext& context) {
     read_area_radiance(element, context);
     return;
   }
-  find_plugin(kEmitters, properties)(properties, context);
   properties.ignore({"samplingWeight"});
+  find_plugin(kEmitters, properties)(properties, context);
   properties.finish();
   context.has_emitter = true;
   context.objects.define(element, NamedObjects::Other{});

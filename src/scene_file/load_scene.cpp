@@ -6,8 +6,9 @@
 #include "driftlight/scene_file.h"
 #include "emitters_xml.h"
 #include "included_files.h"
+#include "integrator_xml.h"
 #include "load_context.h"
-#include "properties.h"
+#include "nearest_names.h"
 #include "sensor_xml.h"
 #include "shapes_xml.h"
 #include "text.h"
@@ -22,6 +23,9 @@ constexpr std::array kUnsupported{"subsurface", "medium",  "volume",   "phase", 
                                   "float",      "integer", "string",   "rgb",   "spectrum",
                                   "point",      "vector",  "transform"};
 
+constexpr std::array kRead{"default", "include", "path",    "alias",   "integrator",
+                           "sensor",  "bsdf",    "texture", "emitter", "shape"};
+
 /// True if a spectrum in the element is a list of wavelengths or a file of such.
 bool has_wavelengths(const Element& element) {
   const std::vector<Element> children = element.children();
@@ -32,30 +36,58 @@ bool has_wavelengths(const Element& element) {
   });
 }
 
-/// Reads one scene: the elements of its file, from top to bottom, into a SceneBuilder.
+/// Reads one scene: the elements of its file, from top to bottom, into a SceneBuilder. What is
+/// wrong with one of them is kept until all have been read.
 class SceneLoader {
  public:
   SceneLoader(const std::filesystem::path& file, const LoadOptions& options)
       : file_(file),
         document_(file),
-        context_{{Substitutions(options.defines), SearchPath(file.parent_path())}, {}, {}, {}} {}
+        context_{{Substitutions(options.defines), SearchPath(file.parent_path()),
+                  Messages(options.strict)},
+                 {},
+                 {}} {}
 
   LoadedScene load() {
+    context_.surroundings.files.add(file_);
     const Element root = open_scene(document_, context_.surroundings);
     read_scene(root);
-    context_.surroundings.substitutions.check_defines_used(file_);
+    if (!messages().is_full())
+      keep_errors(root, [&] { context_.surroundings.substitutions.check_defines_used(file_); });
+    messages().throw_errors();
     if (!has_sensor_) root.fail("the scene has no sensor");
     if (context_.shape_count == 0) root.fail("the scene has no shape");
     if (!context_.has_emitter) root.fail("the scene has no emitter");
     Scene scene = with_location(root, [&] { return context_.builder.build(); });
-    return {std::move(scene), max_depth_, std::move(context_.notices), context_.tone_mapping};
+    return {std::move(scene),      max_depth_,
+            context_.sample_count, messages().notices(),
+            context_.tone_mapping, context_.surroundings.files.files()};
   }
 
  private:
+  Messages& messages() { return context_.surroundings.messages; }
+
+  /// Runs `read`, which is about the element, and keeps its error.
+  template <class Read>
+  void keep_errors(const Element& element, Read read) {
+    try {
+      with_location(element, read);
+    } catch (const Unreadable&) {
+      // What it needs is an error already.
+      context_.objects.define_failed(element);
+    } catch (const SceneError& error) {
+      messages().error(error);
+      context_.objects.define_failed(element);
+    }
+  }
+
   /// Reads all elements of a <scene>.
   void read_scene(const Element& scene) {
-    for (const Element& element : scene.children()) read(element);
-    if (has_backward_spectra(scene.version()) && has_wavelengths(scene))
+    for (const Element& element : scene.children()) {
+      if (messages().is_full()) break;
+      keep_errors(element, [&] { read(element); });
+    }
+    if (!messages().has_errors() && has_backward_spectra(scene.version()) && has_wavelengths(scene))
       context_.notice(scene,
                       "spectra are interpolated as Mitsuba 0.5 did, between two samples from "
                       "the wrong ends; version=\"0.6.0\" has straight lines");
@@ -73,7 +105,7 @@ class SceneLoader {
     } else if (tag == "alias") {
       context_.objects.define_alias(element);
     } else if (tag == "integrator") {
-      read_integrator(element);
+      read_the_integrator(element);
     } else if (tag == "sensor") {
       read_the_sensor(element);
     } else if (tag == "bsdf") {
@@ -102,7 +134,7 @@ class SceneLoader {
     if (root.tag() == "scene")
       read_scene(root);
     else
-      read(root);
+      keep_errors(root, [&] { read(root); });
   }
 
   /// A directory in which other files are looked for, too.
@@ -125,23 +157,9 @@ class SceneLoader {
     has_sensor_ = true;
   }
 
-  void read_integrator(const Element& element) {
-    Properties properties(element);
-    if (properties.type() == "direct") {
-      constexpr int kDirect = 2;
-      max_depth_ = kDirect;
-      context_.notice(element, properties.description() +
-                                   " is not driftlight's; what it renders are paths of up to 2 "
-                                   "edges, which is the depth unless another is given");
-    } else if (properties.type() != "langevin" && properties.type() != "path") {
-      context_.notice(element, properties.description() + " is not driftlight's; only its " +
-                                   spelling("maxDepth", element.dialect()) + " is used");
-    }
-    if (properties.boolean("hideEmitters", false))
-      properties.fail("hideEmitters", "hiding emitters is not supported");
-    if (const auto depth = properties.find("maxDepth")) set_max_depth(*depth);
-    for (const Element& nested : properties.nested({"integrator"})) read_integrator(nested);
-    context_.objects.define(element, NamedObjects::Other{});
+  /// Of several the last one says how long paths are, if it does.
+  void read_the_integrator(const Element& element) {
+    if (const auto depth = read_integrator(element, context_)) max_depth_ = *depth;
   }
 
   /// A block of some other program, which may hold the depth of its integrator. Such blocks have no
@@ -151,20 +169,12 @@ class SceneLoader {
     const bool of_mitsuba =
         std::find(kUnsupported.begin(), kUnsupported.end(), tag) != kUnsupported.end();
     if (of_mitsuba || element.find("type"))
-      element.fail("<" + tag +
-                   "> is not supported in a scene; valid are: default, include, path, alias, "
-                   "integrator, sensor, bsdf, texture, emitter, shape");
+      element.fail("<" + tag + "> is not supported in a scene; " +
+                   hint(tag, {kRead.begin(), kRead.end()}));
     context_.notice(element, "block <" + tag + "> is not ours; only its maxDepth is used");
     for (const Element& child : element.children())
-      if (lower_case(child.find("name").value_or("")) == "maxdepth") set_max_depth(child);
-  }
-
-  /// From an <integer>. Mitsuba counts edges, as we do; -1 is without bound.
-  void set_max_depth(const Element& element) {
-    const std::optional<int> depth = parse_integer(element.text("value"));
-    if (!depth || *depth == 0 || *depth < -1)
-      element.fail("the depth must be a positive integer, or -1 for no bound");
-    max_depth_ = *depth == -1 ? std::nullopt : depth;
+      if (lower_case(child.find("name").value_or("")) == "maxdepth")
+        max_depth_ = read_max_depth(child);
   }
 
   std::filesystem::path file_;

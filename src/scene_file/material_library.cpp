@@ -7,12 +7,14 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <optional>
 #include <sstream>
 #include <utility>
 #include <vector>
 
 #include "bsdfs_xml.h"
+#include "excerpt.h"
 #include "text.h"
 
 namespace driftlight {
@@ -67,12 +69,16 @@ class MtlParser {
     std::ifstream stream(file);
     if (!stream || std::filesystem::is_directory(file))
       throw SceneError({file_}, "the file cannot be opened");
+    text_ = {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+    std::istringstream lines(text_);
     std::string line;
-    while (std::getline(stream, line)) {
+    while (std::getline(lines, line)) {
       ++line_;
       parse(line);
     }
   }
+
+  const std::string& text() const { return text_; }
 
   const std::vector<MtlMaterial>& materials() const { return materials_; }
 
@@ -123,7 +129,8 @@ class MtlParser {
     for (std::string& word : result)
       if (!(words >> word) || !parse_number(word) || std::abs(*parse_number(word)) > 1e9)
         throw SceneError({file_, line_, 1},
-                         fmt::format("'{}' needs {} numbers, not '{}'", key, count, word));
+                         fmt::format("'{}' needs {} numbers, not '{}'", key, count, word) +
+                             excerpt(text_, {file_, line_, 1}));
     return join(result);
   }
   static std::string image(std::istringstream& words) {
@@ -134,6 +141,7 @@ class MtlParser {
   }
 
   std::string file_;
+  std::string text_;
   int line_ = 0;
   std::vector<MtlMaterial> materials_;
 };
@@ -193,19 +201,25 @@ class XmlWriter {
 
   /// None if there is no such file.
   std::optional<std::string> bitmap(const std::string& image, const std::string& name, bool raw) {
-    const std::filesystem::path whole(image);
-    const std::filesystem::path directory = file_.parent_path();
-    for (const auto& file : {directory / whole, directory / whole.filename(),
-                             element_.find_file(image), element_.find_file(whole.filename())}) {
-      if (!std::filesystem::is_regular_file(file)) continue;
+    if (const auto file = find_image(image))
       return fmt::format(R"(<texture name="{}" type="bitmap"><string name="filename" value="{}"/>)"
                          R"(<string name="filterType" value="bilinear"/>{}</texture>)",
-                         name, escaped(std::filesystem::absolute(file).string()),
+                         name, escaped(std::filesystem::absolute(*file).string()),
                          raw ? R"(<float name="gamma" value="1"/>)" : "");
-    }
     context_.notice(element_, "the image '" + image +
                                   "' of a material cannot be found and is taken as black, as in "
                                   "Mitsuba");
+    return std::nullopt;
+  }
+
+  std::optional<std::filesystem::path> find_image(const std::string& image) const {
+    const std::filesystem::path whole(image);
+    const std::filesystem::path directory = file_.parent_path();
+    for (const auto& file : {directory / whole, directory / whole.filename()})
+      if (std::filesystem::is_regular_file(file)) return file;
+    for (const std::string& name : {image, whole.filename().string()})
+      if (const auto file = element_.find_file(name); std::filesystem::is_regular_file(file))
+        return file;
     return std::nullopt;
   }
 
@@ -220,6 +234,7 @@ class XmlWriter {
 /// of its material, which messages then name.
 MaterialLibrary read_material_library(const std::filesystem::path& file, const Element& element,
                                       LoadContext& context) {
+  context.surroundings.files.add(file);
   const MtlParser parser(file);
   XmlWriter writer(file, element, context);
   std::string text = "<materials>";
@@ -229,7 +244,7 @@ MaterialLibrary read_material_library(const std::filesystem::path& file, const E
     line = material.line;
     text += writer.bsdf(material);
   }
-  const XmlDocument document(file, text + "</materials>");
+  const XmlDocument document(file, text + "</materials>", parser.text());
   const std::vector<Element> elements =
       Element(document, document.root(), context.surroundings).children();
   MaterialLibrary result;

@@ -11,6 +11,7 @@
 #include "included_files.h"
 #include "text.h"
 #include "transform_xml.h"
+#include "unsupported.h"
 
 namespace driftlight {
 
@@ -126,14 +127,19 @@ std::optional<std::string> Properties::text(std::string_view name) {
 
 std::string Properties::required_text(std::string_view name) {
   if (auto value = text(name)) return *std::move(value);
-  element_.fail(description() + " lacks the <string> '" + spelling(name, dialect()) + "'");
+  std::string message =
+      fmt::format("{} lacks the <string> '{}'", description(), spelling(name, dialect()));
+  for (const Element& other : unused())
+    if (other.find("name") && is_slip(other.text("name"), name))
+      message += fmt::format("; is it meant by '{}'?", other.text("name"));
+  element_.fail(message);
 }
 
 std::string Properties::choice(std::string_view name, const std::string& fallback,
                                const std::vector<std::string>& valid) {
   const std::string value = lower_case(text(name).value_or(fallback));
   if (std::find(valid.begin(), valid.end(), value) == valid.end())
-    fail(name, "'" + value + "' is not supported; valid are: " + join(valid));
+    fail(name, "'" + value + "' is not supported; " + hint(value, valid));
   return value;
 }
 
@@ -169,14 +175,30 @@ Eigen::Affine3d Properties::transform(std::string_view name) {
   return child ? read_transform(*child) : Eigen::Affine3d::Identity();
 }
 
+std::vector<Element> Properties::unused() const {
+  std::vector<Element> result;
+  for (const Child& child : children_)
+    if (!child.used) result.push_back(child.element);
+  return result;
+}
+
 void Properties::finish() const {
-  for (const Child& child : children_) {
-    if (child.used) continue;
-    if (child.name.empty())
-      child.element.fail("<" + child.element.tag() + "> is not supported in " + description());
-    child.element.fail(fmt::format("unknown property '{}' of {}; valid are: {}",
-                                   child.element.find("name").value_or(child.name), description(),
-                                   names_.empty() ? "none" : join(names_)));
+  for (const Element& child : unused()) {
+    const std::vector<std::string> tags = known_tags();
+    const std::string tag = child.tag();
+    const std::string name = child.find("name").value_or("");
+    if (is_part_of_picture(tag) || is_unsupported_property(element_.tag(), type_, snake_case(name)))
+      child.fail(fmt::format("{} is not supported in {}",
+                             name.empty() ? fmt::format("<{}>", tag) : fmt::format("'{}'", name),
+                             description()));
+    if (std::find(tags.begin(), tags.end(), tag) == tags.end())
+      child.fail(
+          fmt::format("unknown element <{}> in {}; {}", tag, description(), hint(tag, tags)));
+    if (name.empty())
+      child.unused(fmt::format("<{}> is not used in {}", tag, description()));
+    else
+      child.unused(fmt::format("unknown property '{}' of {} is not used; {}", name, description(),
+                               hint(name, names_)));
   }
 }
 

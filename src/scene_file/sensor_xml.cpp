@@ -249,13 +249,18 @@ void shift(Camera& camera, Properties& sensor) {
   camera.center.y() = -2.0 * camera.half_height * sensor.number("principalPointOffsetY", 0.0);
 }
 
-/// How many samples a pixel gets is up to the command line; says which number the scene asks for.
-void note_sampler(const Element& element, LoadContext& context) {
+/// How many samples a pixel gets is up to the command line, unless it does not say. Numbers are
+/// drawn by the integrators.
+void read_sampler(const Element& element, LoadContext& context) {
   Properties sampler(element);
-  const int count = sampler.integer("sampleCount", 4);
-  context.notice(element, fmt::format("{} is not used; its {} is --spp {} on the command line",
-                                      sampler.description(),
-                                      spelling("sampleCount", element.dialect()), count));
+  if (sampler.has("sampleCount")) {
+    context.sample_count = sampler.integer("sampleCount", 4);
+    if (*context.sample_count < 1) sampler.fail("sampleCount", "must be positive");
+  }
+  sampler.ignore({"seed", "scramble", "dimension", "jitter"});
+  sampler.finish();
+  if (sampler.type() != "independent")
+    context.notice(element, sampler.description() + " is not used: samples are independent");
 }
 
 void read_clips(Camera& camera, Properties& sensor) {
@@ -325,7 +330,7 @@ Camera read_sensor(const Element& element, LoadContext& context) {
   crop(camera, film);
   // The others have no focus, and nothing here moves.
   properties.ignore({"focusDistance", "shutterOpen", "shutterClose"});
-  for (const Element& sampler : properties.nested({"sampler"})) note_sampler(sampler, context);
+  for (const Element& sampler : properties.nested({"sampler"})) read_sampler(sampler, context);
   properties.finish();
   context.objects.define(element, NamedObjects::Other{});
   return camera;

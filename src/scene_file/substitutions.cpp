@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "substitutions.h"
 
-#include "text.h"
+#include "nearest_names.h"
 
 namespace driftlight {
 namespace {
@@ -35,6 +35,7 @@ Substitutions::Substitutions(std::map<std::string, std::string> defines)
 
 void Substitutions::add_default(const std::string& name, const std::string& value) {
   values_.try_emplace(name, value);
+  declared_.insert(name);
   unused_defines_.erase(name);
 }
 
@@ -59,11 +60,11 @@ std::string Substitutions::apply(const std::string& text, Dialect dialect) {
     if (!name && keeps_names) continue;
     if (!name)
       throw InputError("'$" + std::string(leading_identifier(rest)) +
-                       "' has no value; give it one with <default> or on the command line "
-                       "(defined are: " +
-                       (values_.empty() ? "none" : join(keys(values_))) + ")");
+                       "' has no value; give it one with <default> or on the command line; " +
+                       hint(leading_identifier(rest), keys(values_)));
     result.append(text, done, dollar - done).append(values_.at(*name));
     unused_defines_.erase(*name);
+    declared_.insert(*name);
     next = done = dollar + 1 + name->size();
     if (result.size() > kMaximumLength)
       throw InputError("with its $names replaced, the text is longer than " +
@@ -73,10 +74,12 @@ std::string Substitutions::apply(const std::string& text, Dialect dialect) {
 }
 
 void Substitutions::check_defines_used(const std::filesystem::path& file) const {
-  if (unused_defines_.empty()) return;
-  throw SceneError({file.string()}, "the definition of '" + *unused_defines_.begin() +
-                                        "' is not used: the scene has no $" +
-                                        *unused_defines_.begin());
+  std::string message;
+  for (const std::string& name : unused_defines_)
+    message += (message.empty() ? "" : "; ") + ("the definition of '" + name) +
+               "' is not used: the scene has no $" + name + "; " +
+               hint(name, {declared_.begin(), declared_.end()});
+  if (!message.empty()) throw SceneError({file.string()}, message);
 }
 
 }  // namespace driftlight

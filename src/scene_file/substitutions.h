@@ -28,7 +28,7 @@ class Substitutions {
   /// own: there those without a value stay.
   std::string apply(const std::string& text, Dialect dialect);
 
-  /// Throws SceneError if the user defined a name that `file` neither uses nor declares.
+  /// Throws SceneError naming all that the user defined and that `file` neither uses nor declares.
   void check_defines_used(const std::filesystem::path& file) const;
 
  private:
@@ -36,6 +36,7 @@ class Substitutions {
 
   std::map<std::string, std::string> values_;
   std::set<std::string> unused_defines_;
+  std::set<std::string> declared_;  ///< names that the scene uses or has a <default> for
 };
 
 }  // namespace driftlight

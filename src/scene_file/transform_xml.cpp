@@ -7,6 +7,7 @@
 
 #include "direction_across.h"
 #include "driftlight/scalar.h"
+#include "nearest_names.h"
 #include "text.h"
 
 namespace driftlight {
@@ -102,8 +103,8 @@ Eigen::Affine3d read_step(const Element& element) {
   if (tag == "scale") return read_scale(element);
   if (tag == "lookat" || tag == "lookAt") return read_look_at(element);
   if (tag == "matrix") return read_matrix(element);
-  element.fail("unknown transform <" + tag +
-               ">; valid are: translate, rotate, scale, lookat, matrix");
+  element.fail("unknown transform <" + tag + ">; " +
+               hint(tag, {"translate", "rotate", "scale", "lookat", "matrix"}));
 }
 
 }  // namespace
