@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// The program as users meet it: exit codes, messages, files, signals, determinism.
+#include <OpenImageIO/imageio.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -228,7 +230,7 @@ TEST_F(Cli, InfoCountsTheSceneAndListsTheIntegrators) {
   EXPECT_EQ(scene.exit_code, 0) << scene.err;
   for (const char* part : {"24 x 16", "4 edges", "1 sphere", "1 diffuse", "1 constant"})
     EXPECT_NE(scene.out.find(part), std::string::npos) << part << " in\n" << scene.out;
-  EXPECT_EQ(scene.out.find("limit"), std::string::npos) << scene.out;
+  EXPECT_EQ(count(scene.out, " all\n"), 10U) << scene.out;
   const Outcome integrators = run({"info", "--integrators"});
   EXPECT_EQ(integrators.exit_code, 0) << integrators.err;
   for (const char* part : {"langevin: ", "pssmlt: ", "mmlt: ", "h2mc: ", "lmc: ", "mala: ", "mlt: ",
@@ -248,8 +250,54 @@ TEST_F(Cli, InfoSaysWhatIntegratorsMiss) {
   const Outcome outcome = run({"info", "glass.xml"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   for (const char* part :
-       {"mlt and erpt cannot", "light misses", "path misses", "all miss", "MB of meshes"})
+       {"\nmlt         nothing: it needs a pinhole\n",
+        "\nerpt        nothing: it needs a pinhole\n",
+        "\nlight       all but what is seen by way of smooth mirrors and glass\n",
+        "\npath        all but light of point, spot and directional emitters by way of smooth "
+        "mirrors and glass\n",
+        "\nlangevin    all but light of point, spot and directional emitters by way of smooth "
+        "mirrors and glass that is seen by way of such\n",
+        "\nbdpt        all but", "MB of meshes"})
     EXPECT_NE(outcome.out.find(part), std::string::npos) << part << " in\n" << outcome.out;
+}
+
+/// With a misspelt property and one that the sphere does not know.
+std::string with_slips() {
+  std::string scene = kScene;
+  const std::string shape = "<shape type=\"sphere\">";
+  scene.replace(scene.find(shape), shape.size(),
+                shape + R"(<float name="radious" value="2"/><float name="gloss" value="1"/>)");
+  return scene;
+}
+
+TEST_F(Cli, WhatIsNotUsedIsNamedAndWithStrictAnError) {
+  write("slips.xml", with_slips());
+  const std::vector<std::string> render{"render", "slips.xml", "--integrator", "path",
+                                        "--spp",  "1",         "-o",           "a.exr"};
+  const Outcome lenient = run(render);
+  EXPECT_EQ(lenient.exit_code, 0) << lenient.err;
+  for (const char* part :
+       {"driftlight: slips.xml:13:", "'radious'", "did you mean 'radius'?", "'gloss'"})
+    EXPECT_NE(lenient.err.find(part), std::string::npos) << part << " in\n" << lenient.err;
+  std::filesystem::remove(folder() / "a.exr");
+
+  const std::set<std::string> before = files();
+  std::vector<std::string> strict_render = render;
+  strict_render.emplace_back("--strict");
+  const std::vector<std::vector<std::string>> lines{
+      strict_render,
+      {"info", "slips.xml", "--strict"},
+      {"gradcheck", "slips.xml", "--strict", "--paths", "1"},
+      {"compare", "slips.xml", "--strict", "--integrators", "path", "--spp", "1", "--out", "d"}};
+  for (const auto& arguments : lines) {
+    const Outcome strict = run(arguments);
+    EXPECT_EQ(strict.exit_code, 2) << arguments[0];
+    EXPECT_EQ(count(strict.err, "error:"), 1U) << strict.err;
+    for (const char* part : {"'radious'", "did you mean 'radius'?", "'gloss'", "   13 | ", "^"})
+      EXPECT_NE(strict.err.find(part), std::string::npos) << part << " in\n" << strict.err;
+    EXPECT_EQ(files(), before);
+  }
+  EXPECT_EQ(run({"info", "scene.xml", "--strict"}).exit_code, 0);
 }
 
 TEST_F(Cli, DiffPrintsTheFigures) {
@@ -343,6 +391,64 @@ TEST_F(Cli, PathTracerReportsItsSamples) {
   EXPECT_EQ(json.at("integrator"), "path");
   EXPECT_EQ(json.at("samples_per_pixel"), 3.0);
   EXPECT_EQ(json.at("options").at("max_depth"), 4);
+}
+
+// The sampler's number is the default of what counts samples, and is spoken of only there.
+TEST_F(Cli, TheSamplerSaysHowManySamples) {
+  std::string scene = kScene;
+  scene.insert(
+      scene.find("    <film"),
+      "<sampler type=\"independent\"><integer name=\"sampleCount\" value=\"3\"/></sampler>");
+  write("sampled.xml", scene);
+  const auto render = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"render",  "sampled.xml", "-o",    "a.exr",
+                                       "--stats", "s.json",      "--set", "max_depth=2"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return outcome.err;
+  };
+  const auto samples = [&] {
+    return nlohmann::json::parse(read("s.json")).at("samples_per_pixel");
+  };
+  EXPECT_NE(render({"--integrator", "path"}).find("3 samples per pixel"), std::string::npos);
+  EXPECT_EQ(samples(), 3.0);
+  EXPECT_EQ(render({"--integrator", "path", "--spp", "2"}), "");
+  EXPECT_EQ(samples(), 2.0);
+  EXPECT_EQ(render({"--integrator", "path", "--time", "0.1"}), "");
+  EXPECT_EQ(render({"--integrator", "mlt", "--mutations-per-pixel", "1"}), "");
+  EXPECT_NE(run({"info", "sampled.xml"}).out.find("3 per pixel"), std::string::npos);
+}
+
+TEST_F(Cli, TheImageAndTheStatisticsNameTheScene) {
+  std::filesystem::create_directory(folder() / "scenes");
+  write("scenes/scene.xml", kScene);
+  const auto render = [&](const std::string& light) {
+    const std::vector<std::string> arguments{
+        "render", "scenes/scene.xml", "-D",   "light=" + light, "-o",    "a.exr", "--spp",
+        "1",      "--integrator",     "path", "--stats",        "s.json"};
+    EXPECT_EQ(run(arguments).exit_code, 0);
+    return nlohmann::json::parse(read("s.json")).at("scene");
+  };
+  const auto scene = render("2");
+  EXPECT_EQ(scene.at("file"), "scene.xml");
+  EXPECT_EQ(scene.at("defines").at("light"), "2");
+  // FNV-1a of 64 bits.
+  std::uint64_t hash = 14695981039346656037U;
+  for (const char c : kScene) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
+  EXPECT_EQ(scene.at("hash"), fmt::format("fnv1a64:{:016x}", hash));
+
+  const auto input = OIIO::ImageInput::open((folder() / "a.exr").string());
+  ASSERT_TRUE(input);
+  const auto attribute = [&](const char* name) {
+    return std::string(input->spec().get_string_attribute(name));
+  };
+  EXPECT_EQ(attribute("driftlight:scene"), "scene.xml");
+  EXPECT_EQ(attribute("driftlight:scene_hash"), scene.at("hash").get<std::string>());
+  EXPECT_EQ(attribute("driftlight:defines"), "light=2");
+  EXPECT_EQ(render("3").at("hash"), scene.at("hash"));
+  write("scenes/scene.xml", kScene + "\n");
+  EXPECT_NE(render("3").at("hash"), scene.at("hash"));
 }
 
 TEST_F(Cli, DefinesReachTheScene) {

@@ -108,6 +108,18 @@ TEST(EmittersXml, ReadsDaylight) {
   EXPECT_GT(luminance(map.eval<double>(up)), 100.0);
   EXPECT_EQ(luminance(map.eval<double>(Vec3d(0.6, -0.8, 0))), 0.0);
 
+  // Law: the scale is that of each part which has none of its own.
+  const auto scaled = [](const std::string& content) {
+    const LoadedScene loaded =
+        load_daylight(R"(<emitter type="sunsky">)" + kSunAbove +
+                      R"(<integer name="resolution" value="64"/>)" + content + "</emitter>");
+    return std::get<EnvironmentMap>(loaded.scene.emitters()[0]).bitmap().texels;
+  };
+  const auto twice = scaled(R"(<float name="scale" value="2"/>)");
+  const auto each = scaled(R"(<float name="sunScale" value="2"/><float name="skyScale" value="2"/>
+                              <float name="scale" value="7"/>)");
+  for (std::size_t i = 0; i < twice.size(); ++i) test::expect_near(twice[i], each[i], 0.0);
+
   const auto of_sky = load_daylight(R"(<emitter type="sky">)" + kSunAbove +
                                     R"(<float name="scale" value="2"/></emitter>)");
   const auto& sky = std::get<EnvironmentMap>(of_sky.scene.emitters()[0]);

@@ -66,7 +66,7 @@ TEST(FuzzCorpus, OfSerializedFiles) {
                           read_serialized(file, 0);
                           read_serialized(file, 1);
                         }),
-            2);
+            3);
 }
 
 }  // namespace

@@ -191,6 +191,9 @@ TEST(ObjFile, GroupsAreSmoothedApart) {
   ASSERT_EQ(meshes.size(), 2U);
   for (const auto& normal : meshes[1].normals) expect_near(normal, Eigen::Vector3f(-1, 0, 0));
   EXPECT_EQ(load_meshes("obj", groups, R"(<boolean name="collapse" value="true"/>)").size(), 1U);
+  const std::string index = R"(<integer name="shapeIndex" value=")";
+  expect_near(load_mesh("obj", groups, index + R"(1"/>)").normals.at(0), Eigen::Vector3f(-1, 0, 0));
+  EXPECT_EQ(load_meshes("obj", groups, index + R"(-1"/>)").size(), 2U);
 }
 
 /// Five squares: without a material, red, glass, gold, red again.
@@ -243,6 +246,7 @@ TEST(ObjFile, TheSceneMayNameItsMaterials) {
   EXPECT_TRUE(std::holds_alternative<Diffuse>(bsdfs[2]));
   EXPECT_TRUE(std::holds_alternative<Conductor>(bsdfs[3]));
   expect_contains(named.notices.back(), "'blue'");
+  expect_contains(named.notices.at(2), "material 'wine glass'");
   for (const Bsdf& bsdf : fronts(load_painted(directory, R"(<bsdf type="plastic"/>)").scene))
     EXPECT_TRUE(std::holds_alternative<Plastic>(bsdf));
   const std::string off = R"(<boolean name="loadMaterials" value="false"/>)";
@@ -267,8 +271,17 @@ TEST(ObjFile, SaysWhatIsWrongWithALibrary) {
     return 0;
   };
   EXPECT_EQ(location("newmtl red\n\nKd 1 zero 0\n"), 3);
-  // Smooth glass under a mask is not supported.
-  EXPECT_EQ(location("newmtl red\n\nnewmtl glass\nillum 4\nd 0.5\n"), 3);
+  EXPECT_EQ(location("newmtl red\n\nnewmtl glass\nillum 2\nKd -1 0 0\n"), 3);
+}
+
+// Smooth glass under a mask would have two ways to transmit.
+TEST(ObjFile, GlassOfALibraryHasNoOpacity) {
+  const SceneDirectory directory;
+  directory.write("some.mtl", "newmtl red\n\nnewmtl wine glass\nillum 4\nd 0.5\nnewmtl gold\n");
+  const LoadedScene loaded = load_painted(directory);
+  EXPECT_TRUE(std::holds_alternative<Dielectric>(fronts(loaded.scene)[2]));
+  ASSERT_EQ(loaded.notices.size(), 1U);
+  expect_contains(loaded.notices[0], "some.mtl:3:1: the opacity of the glass 'wine glass'");
 }
 
 TEST(ObjFile, RefusesBadFiles) {
@@ -276,12 +289,83 @@ TEST(ObjFile, RefusesBadFiles) {
   expect_contains(mesh_error("obj", ""), "no faces");
   expect_contains(mesh_error("obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n"), "vertex 3");
   expect_contains(mesh_error("obj", "v 0 0 0\nf 1 1 -2\n"), "vertex -2");
-  expect_contains(mesh_error("obj", "v 0 0 0\nf a b c\n"), "vertex 0");
+  expect_contains(mesh_error("obj", "v 0 0 0\nf 0 1 1\n"), "vertex 0");
   expect_contains(mesh_error("obj", "v 0 0 0\nf 1//2 1//2 1//2\n"), "normal 2");
   expect_contains(mesh_error("obj", "v 0 0 0\nf 1/5 1/5 1/5\n"), "texture coordinate 5");
   expect_contains(mesh_error("obj", "v 0 0 0\nf 1 1\n"), "three corners");
   expect_contains(mesh_error("obj", "v 1e999 0 0\nf 1 1 1\n"), "finite");
-  expect_contains(mesh_error("obj", "v 0 0 0\nvn 0 0 1\nf 1//1 1//1 1//1\nf 1 1 1\n"), "normals");
+}
+
+TEST(ObjFile, NamesTheLineThatIsWrong) {
+  const std::string start = "# made by hand\nv 0 0 0\r\nv 1 0 0\n\nv 0 1 0\n";
+  const auto error = [&](const std::string& line) {
+    const std::string text = mesh_error("obj", start + line + "\nf 1 2 3\n");
+    expect_contains(text, "mesh:6: ");
+    expect_contains(text, "\n    6 | " + line);
+    return text;
+  };
+  expect_contains(error("f 1 2 9"), "vertex 9, but there are only 3");
+  expect_contains(error("f 1/1 2/1 3/1"), "texture coordinate 1, but there are only 0");
+  expect_contains(error("f 1 2"), "three corners");
+  expect_contains(error("f 1 2 3x"), "'3x'");
+  expect_contains(error("f 1/2/3/4 2 3"), "'1/2/3/4'");
+  expect_contains(error("f"), "three corners");
+  expect_contains(error("v 1 oops 0"), "'oops' is not a number");
+  expect_contains(error("v 1 2"), "needs 3 numbers, not 2");
+  expect_contains(error("v 1.2.3 0 0"), "'1.2.3'");
+  expect_contains(error("v 1 0 -"), "'-'");
+  expect_contains(error("v 1 0 3e"), "'3e'");
+  expect_contains(error("v nan 0 0"), "'nan'");
+  expect_contains(error("vn 0 1"), "'vn' needs 3 numbers");
+  expect_contains(error("vt"), "'vt' needs 1 numbers");
+  expect_contains(error("bogus line"), "unknown statement 'bogus'");
+  expect_contains(error("usemtll red"), "did you mean 'usemtl'?");
+  expect_contains(mesh_error("obj", start + "v 1e99 0 0\nf 1 2 4\n"), "mesh:6: '1e99'");
+}
+
+TEST(ObjFile, RefusesZerosInItsText) {
+  std::string file = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  file[file.find('\n')] = '\0';
+  expect_contains(mesh_error("obj", file), "mesh:1: ");
+}
+
+// Pieces do not know their lines.
+TEST(ObjFile, NamesALineFarDown) {
+  std::string file = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  for (int i = 0; i < 50000; ++i) file += "f 1 2 3\n";
+  expect_contains(mesh_error("obj", file + "f 1 2 4\n"), "mesh:50004: a face refers to vertex 4");
+  expect_contains(mesh_error("obj", file + "f 1 2 c\n"), "mesh:50004: 'c'");
+}
+
+TEST(ObjFile, IgnoresOtherStatements) {
+  const TriangleMesh mesh = load_mesh(
+      "obj",
+      "\xEF\xBB\xBF# BOM\n  \t\nmtllib none.mtl\no thing\ns off\nv 0 0 0 1.0\nv +1. .0 -0E+1 # a\n"
+      "v 0 1 0 0.5 0.5 0.5\nvp 0.1\nl 1 2\np 1\ncstype bezier\ndeg 3\ncurv 0 1 1 2\nend\n"
+      "lod 3\nf 1 2 3\r\n");
+  EXPECT_EQ(mesh.triangles.size(), 1U);
+  EXPECT_EQ(mesh.positions.size(), 3U);
+}
+
+// A square with normals of its own and one without, at a right angle.
+TEST(ObjFile, SmoothsWhereNormalsAreMissing) {
+  const SceneDirectory directory;
+  directory.write("mesh",
+                  "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 -1\nv 0 1 -1\nvn 0.6 0 0.8\n"
+                  "f 1//1 2//1 3//1 4//1\nf 5 1 4 6\n");
+  const auto load = [&](const std::string& content) {
+    return directory.load(lit(shape_element("obj", content)));
+  };
+  const LoadedScene loaded = load("");
+  const auto& mesh = std::get<TriangleMesh>(loaded.scene.shapes()[0].geometry);
+  ASSERT_EQ(mesh.positions.size(), 8U);
+  for (std::size_t t = 0; t < 4; ++t)
+    for (const std::uint32_t vertex : mesh.triangles[t])
+      expect_near(mesh.normals[vertex],
+                  t < 2 ? Eigen::Vector3f(0.6F, 0, 0.8F) : Eigen::Vector3f(-1, 0, 0));
+  ASSERT_EQ(loaded.notices.size(), 1U);
+  expect_contains(loaded.notices[0], "4 vertices of 'mesh' have no normal");
+  EXPECT_TRUE(load(kFaceNormals).notices.empty());
 }
 
 // --- serialized ----------------------------------------------------------------------------------
@@ -366,6 +450,53 @@ TEST(SerializedFile, ReadsDoublePrecisionWithAllArrays) {
   expect_near(mesh.normals.at(2), Eigen::Vector3f(0, 0, -1));
   expect_near(mesh.uvs.at(1), Eigen::Vector2f(0.3F, 0.4F));
   EXPECT_EQ(mesh.triangles.at(0), (std::array<std::uint32_t, 3>{2, 1, 0}));
+}
+
+/// A triangle of version 5, with one record of these three floats and texture coordinates a vertex.
+std::string packed_triangle(std::uint32_t flags, const Eigen::Vector3f& frame) {
+  std::string bytes;
+  append<std::uint32_t>(bytes, 0x1000 | flags);
+  append<std::uint32_t>(bytes, 4);
+  bytes += "name";
+  append_all<std::uint64_t>(bytes, {3, 1, 2, 1});
+  for (const auto& p :
+       {Eigen::Vector3f(0, 0, 0), Eigen::Vector3f(1, 0, 0), Eigen::Vector3f(0, 1, 0)})
+    append_all<float>(bytes, {p.x(), p.y(), p.z(), frame.x(), frame.y(), frame.z(), p.x(), p.y()});
+  append_all<std::uint32_t>(bytes, {0, 1, 2, 0x80000000U});
+  append_all<std::uint32_t>(bytes, {0, 0, 1, 0, 0, 0});  // distinct positions and normals
+  append<std::uint32_t>(bytes, 2);
+  for (const std::string name : {"face_weight", "vertex_color"}) {
+    append(bytes, static_cast<std::uint32_t>(name.size()));
+    bytes += name + '\0';
+    append<std::uint32_t>(bytes, name == "vertex_color" ? 3 : 1);
+    for (int i = 0; i < (name == "vertex_color" ? 9 : 1); ++i) append(bytes, 0.25F);
+  }
+  return mesh_header(5) + compress_bytes(bytes);
+}
+
+TEST(SerializedFile, ReadsRecordsOfMitsuba3) {
+  constexpr std::uint32_t kNormals = 1, kFrames = 2, kTexCoords = 4, kFlat = 16;
+  const TriangleMesh plain = load_mesh("serialized", packed_triangle(0, {0, 0, 0}));
+  expect_near(plain.positions.at(1), Eigen::Vector3f(1, 0, 0));
+  expect_near(plain.normals.at(0), Eigen::Vector3f(0, 0, 1));  // computed
+  EXPECT_TRUE(plain.uvs.empty());
+  EXPECT_EQ(plain.triangles.at(0), (std::array<std::uint32_t, 3>{0, 1, 2}));
+
+  const TriangleMesh smooth =
+      load_mesh("serialized", packed_triangle(kNormals | kTexCoords, {0, 0.6F, 0.8F}));
+  expect_near(smooth.normals.at(2), Eigen::Vector3f(0, 0.6F, 0.8F));
+  expect_near(smooth.uvs.at(2), Eigen::Vector2f(0, 1));
+
+  // A turn by 90 degrees about x takes z to -y; it is stored as tan(90 / 4 degrees) x.
+  const float turned = std::tan(static_cast<float>(kPi) / 8.0F);
+  const TriangleMesh framed =
+      load_mesh("serialized", packed_triangle(kNormals | kFrames | kTexCoords, {turned, 0, 0}));
+  expect_near(framed.normals.at(0), Eigen::Vector3f(0, -1, 0));
+
+  const std::string flat = packed_triangle(kNormals | kFlat, {0, 0.6F, 0.8F});
+  EXPECT_TRUE(load_mesh("serialized", flat).normals.empty());
+  const std::string shaded = R"(<boolean name="faceNormals" value="false"/>)";
+  EXPECT_FALSE(load_mesh("serialized", flat, shaded).normals.empty());
 }
 
 TEST(SerializedFile, FindsMeshesByIndex) {

@@ -188,7 +188,7 @@ TEST(PlyFile, RefusesImpossibleCountsBeforeItAllocates) {
                     "element face 1\n" + kIndices + "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
   };
   expect_contains(with_count("9223372036854775807"), "9223372036854775807 elements 'vertex'");
-  expect_contains(with_count("99223372036854775807"), "line 3");
+  expect_contains(with_count("99223372036854775807"), "mesh.ply:3: ");
   const std::string list =
       header("ascii", kXyz, 3, kIndices, 1) + "0 0 0\n1 0 0\n0 1 0\n1000000000 0 1 2\n";
   expect_contains(error_of(list), "longer than the file");
@@ -199,7 +199,8 @@ TEST(PlyFile, RefusesBadFiles) {
   expect_contains(error_of("ply\nformat ascii 1.0\n"), "no end");
   expect_contains(error_of("ply\nend_header\n"), "no format");
   expect_contains(error_of("ply\nformat text 1.0\nend_header\n"), "binary_little_endian");
-  expect_contains(error_of("ply\nformat ascii 1.0\nproperty float x\nend_header\n"), "line 3");
+  expect_contains(error_of("ply\nformat ascii 1.0\nproperty float x\nend_header\n"),
+                  "mesh.ply:3: ");
   expect_contains(
       error_of("ply\nformat ascii 1.0\nelement vertex 1\nproperty half x\nend_header\n"), "'half'");
   expect_contains(error_of(header("ascii", "property float x\n", 1, kIndices, 1) + "0\n3 0 0 0\n"),
@@ -209,11 +210,14 @@ TEST(PlyFile, RefusesBadFiles) {
   const auto with_face = [](const std::string& face) {
     return header("ascii", kXyz, 3, kIndices, 1) + "0 0 0\n1 0 0\n0 1 0\n" + face + "\n";
   };
-  expect_contains(error_of(with_face("3 0 1 3")), "vertex 3");
+  expect_contains(error_of(with_face("3 0 1 3")),
+                  "mesh.ply:14: a face refers to vertex 3, but there are only 3\n   14 | 3 0 1 3");
   expect_contains(error_of(with_face("3 0 1 -1")), "vertex -1");
   expect_contains(error_of(with_face("3 0 1 1.5")), "vertex 1.5");
   expect_contains(error_of(with_face("2 0 1 1")), "three corners");
-  expect_contains(error_of(with_face("3 0 1 x")), "'x'");
+  expect_contains(error_of(with_face("3 0 1 x")), "mesh.ply:14: 'x'");
+  expect_contains(error_of(header("ascii", kXyz, 3, kIndices, 1) + "0 0 0\n1 1e99 0\n0 1 0\n"),
+                  "mesh.ply:12: 1e+99 does not fit");
   expect_contains(error_of(with_face("3 0 1 nan")), "'nan'");
 }
 

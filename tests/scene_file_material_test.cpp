@@ -146,6 +146,11 @@ TEST(BsdfsXml, ReadsWard) {
   EXPECT_EQ(rough.variant, Ward::Variant::Duer);
   EXPECT_EQ(rough.alpha_u, 0.3);
   EXPECT_EQ(rough.alpha_v, 0.1);
+  const auto both = std::get<Ward>(load_bsdf(
+      R"(<bsdf type="ward"><float name="alpha" value="0.2"/><float name="alphaV" value="0.4"/>
+         </bsdf>)"));
+  EXPECT_EQ(both.alpha_u, 0.2);
+  EXPECT_EQ(both.alpha_v, 0.4);
 }
 
 TEST(BsdfsXml, ReadsCoatings) {
@@ -231,6 +236,15 @@ TEST(BsdfsXml, ScalesReflectanceAboveOneAndSaysSo) {
   EXPECT_EQ(loaded.notices.size(), 1U);
 }
 
+TEST(BsdfsXml, ScalesOpacityAboveOneAndSaysSo) {
+  const LoadedScene loaded = load_shape(
+      "sphere",
+      R"(<bsdf type="mask"><rgb name="opacity" value="2, 1, 0"/><bsdf type="diffuse"/></bsdf>)");
+  expect_near(std::get<Mask>(loaded.scene.bsdfs()[0]).opacity.color, Rgbd(0.99, 0.495, 0));
+  ASSERT_EQ(loaded.notices.size(), 1U);
+  EXPECT_NE(loaded.notices[0].find("opacity"), std::string::npos);
+}
+
 TEST(BsdfsXml, OpaqueBsdfsHaveNoBackUnlessTwoSided) {
   const SceneDirectory directory;
   const LoadedScene loaded = directory.load(lit(
@@ -259,6 +273,13 @@ TEST(BsdfsXml, ReadsBlends) {
   EXPECT_TRUE(std::holds_alternative<Diffuse>(blend.first->bsdf));
   EXPECT_TRUE(std::holds_alternative<Dielectric>(blend.second->bsdf));
   EXPECT_TRUE(is_transmissive(blend));
+  const std::string nested = R"(<bsdf type="diffuse"/><bsdf type="phong"/></bsdf>)";
+  const Bsdf plain = load_bsdf(R"(<bsdf type="blendbsdf">)" + nested);
+  EXPECT_NEAR(std::get<Blend>(plain).weight.color[0], 0.5, 1e-12);
+  const LoadedScene full =
+      load_shape("sphere", R"(<bsdf type="blendbsdf"><float name="weight" value="1.5"/>)" + nested);
+  EXPECT_EQ(std::get<Blend>(full.scene.bsdfs()[0]).weight.color[0], 1.0);
+  EXPECT_EQ(full.notices.size(), 1U);
 }
 
 // Law: a blend of what has two sides has two sides; black is blended where only one has.
@@ -279,7 +300,7 @@ TEST(BsdfsXml, BlendsBothSides) {
 // Law: a mixture is the weighted sum of its parts.
 TEST(BsdfsXml, MixturesAreWeightedSums) {
   const Bsdf mixture = load_bsdf(
-      R"(<bsdf type="mixturebsdf"><string name="weights" value="0.2, 0.3, 0.4"/>
+      R"(<bsdf type="mixturebsdf"><string name="weights" value="0.2; 0.3, 0.4"/>
          <bsdf type="diffuse"><rgb name="reflectance" value="0.5"/></bsdf>
          <bsdf type="phong"/>
          <bsdf type="diffuse"><rgb name="reflectance" value="0.9"/></bsdf></bsdf>)");
@@ -332,7 +353,7 @@ TEST(BsdfsXml, NoticesWhatNormalMapsLeaveOut) {
              <boolean name="useShadowingFunction" value="true"/><bsdf type="diffuse"/></bsdf>
              </shape>)"));
   ASSERT_EQ(loaded.notices.size(), 1U);
-  EXPECT_NE(loaded.notices[0].find("face away"), std::string::npos);
+  EXPECT_NE(loaded.notices[0].find("useShadowingFunction"), std::string::npos);
 }
 
 // Law: a <ref> in a map may name its texture or its bsdf, in any order.

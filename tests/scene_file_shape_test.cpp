@@ -108,6 +108,20 @@ TEST(ShapesXml, CubesFaceOutward) {
   EXPECT_NEAR(shape.extent.area, 8 * (1 * 2 + 2 * 3 + 3 * 1), 1e-4);
 }
 
+// Mitsuba 0.6 has nothing but the winding to go by then, which a mirror image reverses.
+TEST(ShapesXml, MirroredCubesOfFaceNormalsTurnInsideOut) {
+  const auto outward = [](const std::string& axis) {
+    const Shape shape =
+        load_shape(R"(<shape type="cube"><boolean name="faceNormals" value="true"/>)"
+                   R"(<transform name="toWorld"><scale )" +
+                   axis + R"(/></transform></shape>)");
+    const auto& mesh = std::get<TriangleMesh>(shape.geometry);
+    return triangle_normal(mesh, 0).dot(mesh.positions[mesh.triangles[0][0]].cast<double>());
+  };
+  EXPECT_GT(outward(R"(x="1")"), 0.9);
+  EXPECT_LT(outward(R"(x="-1")"), -0.9);
+}
+
 TEST(ShapesXml, ReadsDisks) {
   const auto disk = [](const std::string& content) {
     return std::get<Disk>(load_shape("<shape type=\"disk\">" + content + "</shape>").geometry);

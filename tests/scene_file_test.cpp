@@ -12,6 +12,7 @@ namespace driftlight {
 namespace {
 
 using test::complete;
+using test::expect_contains;
 using test::expect_near;
 using test::kEmitter;
 using test::kShape;
@@ -113,6 +114,15 @@ TEST(SceneFile, SaysWhichIntegratorIsNotOurs) {
             std::string::npos);
 }
 
+// Law: emitted and direct light take at most two edges.
+TEST(SceneFile, TheDirectIntegratorTakesTwoEdges) {
+  const SceneDirectory directory;
+  const LoadedScene loaded = directory.load(complete(R"(<integrator type="direct"/>)"));
+  EXPECT_EQ(loaded.max_depth, 2);
+  ASSERT_EQ(loaded.notices.size(), 1U);
+  expect_contains(loaded.notices[0], "2 edges");
+}
+
 TEST(SceneFile, KeepsTheDepthOfForeignBlocks) {
   const SceneDirectory directory;
   const LoadedScene loaded = directory.load(complete(
@@ -123,7 +133,63 @@ TEST(SceneFile, KeepsTheDepthOfForeignBlocks) {
   EXPECT_NE(loaded.notices[0].find("<dpt>"), std::string::npos);
 }
 
+// --- The film ------------------------------------------------------------------------------------
+
+/// A scene whose sensor has this content.
+LoadedScene load_with(const std::string& content) {
+  return SceneDirectory().load(
+      scene_file("<sensor type=\"perspective\">" + content + "</sensor>" + kEmitter + kShape));
+}
+
+TEST(FilmXml, ASensorWithoutAFilmHasTheDefaultOne) {
+  const LoadedScene loaded = load_with("");
+  const Camera& camera = loaded.scene.camera();
+  EXPECT_EQ(camera.film_width, 768);
+  EXPECT_EQ(camera.film_height, 576);
+  EXPECT_EQ(camera.filter.kind, ReconstructionFilter::Kind::Gaussian);
+  EXPECT_EQ(camera.filter.radius, 2.0);
+  EXPECT_TRUE(loaded.notices.empty());
+}
+
+TEST(FilmXml, SkipsAnnotations) {
+  const LoadedScene loaded = load_with(
+      R"(<film type="ldrfilm"><string name="label[10, 10]" value="$integrator['type'], $scene['x']"/>
+         <string name="metadata['Author']" value="nobody"/></film>)");
+  ASSERT_EQ(loaded.notices.size(), 1U);
+  expect_contains(loaded.notices[0], "label[10, 10], metadata['Author']");
+  EXPECT_THROW(
+      load_with(R"(<film type="hdrfilm"><string name="label[1,1]" value="$scene"/></film>)"),
+      SceneError);
+}
+
+TEST(FilmXml, NoticesFormatsOfPixels) {
+  for (const std::string format : {"luminance", "rgba", "spectrum"}) {
+    const LoadedScene loaded = load_with(
+        R"(<film type="hdrfilm"><string name="pixelFormat" value=")" + format + R"("/></film>)");
+    ASSERT_EQ(loaded.notices.size(), 1U);
+    expect_contains(loaded.notices[0], "pixelFormat '" + format + "'");
+  }
+  EXPECT_TRUE(load_with(R"(<film type="hdrfilm"><string name="pixelFormat" value="RGB"/></film>)")
+                  .notices.empty());
+}
+
 // --- The sensor ----------------------------------------------------------------------------------
+
+// Law: without an up the sensor is turned as Mitsuba's is, which differs by version.
+TEST(SensorXml, LooksAtWithoutUp) {
+  const auto up = [](const std::string& attribute, const std::string& version) {
+    std::string file = scene_file(
+        sensor(R"(<transform name="toWorld"><lookat origin="1, 2, 3" target="1.6, 2, 3.8")" +
+               attribute + "/></transform>") +
+        kEmitter + kShape);
+    file.replace(file.find("0.6.0"), 5, version);
+    return SceneDirectory().load(file).scene.camera().up;
+  };
+  for (const std::string attribute : {"", R"( up="")", R"( up="0, 0, 0")"}) {
+    expect_near(up(attribute, "0.6.0"), Vec3d(0, -1, 0));
+    expect_near(up(attribute, "3.0.0"), Vec3d(0.8, 0, -0.6));
+  }
+}
 
 TEST(SensorXml, LooksAlongZWithXOnTheLeft) {
   const Camera camera = load_camera(R"(<float name="fov" value="60"/>)");

@@ -69,10 +69,34 @@ TEST(BitmapXml, ReadsFilters) {
   EXPECT_TRUE(texture_of(bitmap("")).interpolates);
 }
 
+TEST(BitmapXml, RefusesSingleChannels) {
+  expect_contains(error_of(bitmap(R"(<string name="channel" value="r"/>)")),
+                  "'channel' is not supported in texture 'bitmap'");
+}
+
 TEST(BitmapXml, LeavesRawFilesAsTheyAre) {
   const Texture raw = texture_of(bitmap(R"(<boolean name="raw" value="true"/>)"), "3.0.0");
   EXPECT_NEAR(raw.bitmap->at(0, 0).x(), 128.0 / 255.0, 1e-6);
   EXPECT_LT(texture_of(bitmap(""), "3.0.0").bitmap->at(0, 0).x(), 0.22F);
+}
+
+TEST(BitmapXml, NoticesNormalsThatAreDecodedAsSrgb) {
+  const SceneDirectory directory;
+  write_two_greys(directory.path() / "two.png");
+  const auto notices = [&](const std::string& type, const std::string& content) {
+    return directory
+        .load(test::lit(R"(<shape type="rectangle"><bsdf type=")" + type +
+                        R"("><texture type="bitmap"><string name="filename" value="two.png"/>
+                           <string name="filterType" value="bilinear"/>)" +
+                        content + R"(</texture><bsdf type="diffuse"/></bsdf></shape>)"))
+        .notices;
+  };
+  for (const std::string type : {"normalmap", "bumpmap"}) {
+    ASSERT_EQ(notices(type, "").size(), 1U);
+    expect_contains(notices(type, "")[0], "'gamma' as 1");
+    EXPECT_TRUE(notices(type, R"(<float name="gamma" value="1"/>)").empty());
+    EXPECT_TRUE(notices(type, R"(<float name="gamma" value="-1"/>)").empty());
+  }
 }
 
 TEST(BitmapXml, MapsCoordinates) {
@@ -228,6 +252,10 @@ TEST(VertexColors, AreRefusedWhereTheyCannotBe) {
       error(colored_shape(R"(<bsdf type="mask"><texture name="opacity" type="checkerboard"/>)" +
                           diffuse + "</bsdf>")),
       "another texture");
+  expect_contains(
+      error(colored_shape(R"(<bsdf type="blendbsdf"><texture name="weight" type="vertexcolors"/>)" +
+                          diffuse + diffuse + "</bsdf>")),
+      "one number");
   expect_contains(
       error(colored_shape(
           R"(<emitter type="area"><texture name="radiance" type="vertexcolors"/></emitter>)")),

@@ -63,6 +63,7 @@ struct Raw {
   std::vector<std::string> outputs;
   std::string integrator = "langevin";
   std::vector<std::string> defines;
+  bool strict = false;
   std::vector<std::string> settings;
   std::optional<std::string> time;
   std::optional<std::string> mutations_per_pixel;
@@ -97,6 +98,14 @@ CLI::Option* add_repeatable(CLI::App& app, const std::string& flags, std::vector
   return app.add_option(flags, into, help)->allow_extra_args(false);
 }
 
+/// How the scene is read.
+void declare_scene_options(CLI::App& app, Raw& raw) {
+  add_repeatable(app, "-D,--define", raw.defines, "value for $NAME in the scene; repeatable")
+      ->type_name("NAME=VALUE");
+  app.add_flag("--strict", raw.strict,
+               "properties and attributes of the scene that nobody uses are errors");
+}
+
 void declare_render(CLI::App& app, Raw& raw) {
   app.add_option("scene", raw.scene, "Mitsuba scene file (XML)")->required()->type_name("SCENE");
   add_repeatable(app, "-o,--output", raw.outputs,
@@ -106,8 +115,7 @@ void declare_render(CLI::App& app, Raw& raw) {
   app.add_option("--integrator", raw.integrator,
                  "langevin, pssmlt, mmlt, h2mc, lmc, mala, mlt, erpt, path, bdpt or light")
       ->capture_default_str();
-  add_repeatable(app, "-D,--define", raw.defines, "value for $NAME in the scene; repeatable")
-      ->type_name("NAME=VALUE");
+  declare_scene_options(app, raw);
   add_repeatable(app, "--set", raw.settings,
                  "option of the integrator, see `driftlight info --integrators`; repeatable")
       ->type_name("OPTION=VALUE");
@@ -117,7 +125,7 @@ void declare_render(CLI::App& app, Raw& raw) {
          "work of langevin with mode=chain, pssmlt, mmlt, h2mc, lmc, mala and mlt (default: 100)")
       ->type_name("N");
   app.add_option("--spp", raw.samples_per_pixel,
-                 "work of all others, samples per pixel (default: 64)")
+                 "work of all others, samples per pixel (default: the scene's, else 64)")
       ->type_name("N");
   app.add_option("-t,--threads", raw.threads, "threads; 0: all")
       ->type_name("N")
@@ -176,8 +184,7 @@ void declare_compare(CLI::App& app, Raw& raw) {
   app.add_option("--runs", raw.runs, "independent runs of each, at least 2")
       ->type_name("N")
       ->capture_default_str();
-  add_repeatable(app, "-D,--define", raw.defines, "value for $NAME in the scene; repeatable")
-      ->type_name("NAME=VALUE");
+  declare_scene_options(app, raw);
   app.add_option("-t,--threads", raw.threads, "threads; 0: all")
       ->type_name("N")
       ->capture_default_str();
@@ -188,8 +195,7 @@ void declare_compare(CLI::App& app, Raw& raw) {
 
 void declare_gradcheck(CLI::App& app, Raw& raw) {
   app.add_option("scene", raw.scene, "Mitsuba scene file (XML)")->required()->type_name("SCENE");
-  add_repeatable(app, "-D,--define", raw.defines, "value for $NAME in the scene; repeatable")
-      ->type_name("NAME=VALUE");
+  declare_scene_options(app, raw);
   app.add_option("--paths", raw.paths, "paths to check")->type_name("N")->capture_default_str();
   app.add_option("--max-depth", raw.max_depth, "longest path, in edges (default: as render)")
       ->type_name("N");
@@ -209,8 +215,7 @@ void declare_gradcheck(CLI::App& app, Raw& raw) {
 
 void declare_info(CLI::App& app, Raw& raw) {
   app.add_option("scene", raw.scene, "Mitsuba scene file (XML)")->type_name("SCENE");
-  add_repeatable(app, "-D,--define", raw.defines, "value for $NAME in the scene; repeatable")
-      ->type_name("NAME=VALUE");
+  declare_scene_options(app, raw);
   app.add_flag("--integrators", raw.integrators, "list the integrators and their options");
 }
 
@@ -223,7 +228,7 @@ void declare_diff(CLI::App& app, Raw& raw) {
 }
 
 SceneArguments scene_arguments(const Raw& raw) {
-  SceneArguments scene{.file = raw.scene, .defines = {}};
+  SceneArguments scene{.file = raw.scene, .defines = {}, .strict = raw.strict};
   for (const std::string& define : raw.defines) {
     const auto [name, value] = split_setting("-D", define);
     scene.defines.insert_or_assign(name, value);

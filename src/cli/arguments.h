@@ -29,6 +29,7 @@ enum class Verbosity { Quiet, Normal, Verbose };
 struct SceneArguments {
   std::filesystem::path file;
   std::map<std::string, std::string> defines;
+  bool strict = false;  ///< what is not used of the file is an error
 };
 
 /// Options of an integrator by name, with their values.

@@ -18,13 +18,13 @@
 #include "cli/interrupt.h"
 #include "cli/print.h"
 #include "cli/progress_bar.h"
+#include "cli/scene.h"
 #include "cli/terms_study.h"
 #include "cli/text_file.h"
 #include "driftlight/error.h"
 #include "driftlight/image.h"
 #include "driftlight/running_mean.h"
 #include "driftlight/scalar.h"
-#include "driftlight/scene_file.h"
 #include "pending_folder.h"
 
 namespace driftlight::cli {
@@ -45,8 +45,8 @@ std::optional<Image> read_reference(const CompareCommand& command, const Camera&
   return image;
 }
 
-LoadedScene load(const CompareCommand& command) {
-  LoadedScene loaded = load_scene(command.scene.file, {.defines = command.scene.defines});
+LoadedScene load_with_notices(const CompareCommand& command) {
+  LoadedScene loaded = load(command.scene);
   for (const std::string& notice : loaded.notices) print_notice(notice);
   return loaded;
 }
@@ -124,7 +124,8 @@ struct Compared {
 };
 
 /// Renders all runs with one budget.
-Compared compare(const LoadedScene& loaded, const CompareCommand& command, const Work& work,
+Compared compare(const LoadedScene& loaded, const SceneIdentity& identity,
+                 const CompareCommand& command, const Work& work,
                  const std::optional<Image>& reference) {
   std::vector<Contender> contenders = contenders_of(command.integrators, work);
   take_depths(loaded, contenders);
@@ -134,6 +135,8 @@ Compared compare(const LoadedScene& loaded, const CompareCommand& command, const
         loaded.scene, command, work, stop_on_interrupt(),
         [&](const Progress& progress) { bar.update(progress); }, contenders);
   }
+  for (Contender& contender : contenders)
+    for (Run& run : contender.runs) add_scene(identity, run.metadata, run.statistics);
   const std::size_t complete = contenders.front().runs.size();
   if (complete < static_cast<std::size_t>(command.runs))
     print_notice(fmt::format("stopped early: {} of {} runs of each", complete, command.runs));
@@ -156,7 +159,8 @@ std::string summarize(const std::vector<nlohmann::ordered_json>& results,
 void run(const CompareCommand& command) {
   for (const Budget& budget : command.budgets) contenders_of(command.integrators, budget.work);
   check_folder_target(command.folder);
-  const LoadedScene loaded = load(command);
+  const LoadedScene loaded = load_with_notices(command);
+  const SceneIdentity identity = identity_of(command.scene, loaded);
   const std::optional<Image> reference = read_reference(command, loaded.scene.camera());
   if (!reference)
     print_notice(
@@ -169,7 +173,7 @@ void run(const CompareCommand& command) {
   for (const Budget& budget : command.budgets) {
     std::optional<Compared> compared;
     try {
-      compared = compare(loaded, command, budget.work, reference);
+      compared = compare(loaded, identity, command, budget.work, reference);
     } catch (const StoppedTooEarly&) {
       if (results.empty()) throw;
       print_notice(fmt::format("stopped early: there is no {}", budget.folder));

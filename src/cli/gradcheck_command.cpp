@@ -11,9 +11,9 @@
 #include "cli/path_report.h"
 #include "cli/print.h"
 #include "cli/progress_bar.h"
+#include "cli/scene.h"
 #include "cli/text_file.h"
 #include "driftlight/scene_check.h"
-#include "driftlight/scene_file.h"
 #include "pending_file.h"
 #include "stopwatch.h"
 
@@ -33,6 +33,7 @@ std::string replay_line(const GradcheckCommand& command, std::uint64_t index) {
   std::string line = "driftlight gradcheck " + quoted(command.scene.file.string());
   for (const auto& [name, value] : command.scene.defines)
     line += fmt::format(" -D {}", quoted(fmt::format("{}={}", name, value)));
+  if (command.scene.strict) line += " --strict";
   if (command.max_depth) line += fmt::format(" --max-depth {}", *command.max_depth);
   if (command.phase_space != LangevinOptions{}.phase_space)
     line += fmt::format(" --phase-space {}", name_of(command.phase_space));
@@ -101,7 +102,7 @@ void check(const GradcheckCommand& command, const Scene& scene, int depth) {
 
 void run(const GradcheckCommand& command) {
   if (command.json) check_target(*command.json);
-  const LoadedScene loaded = load_scene(command.scene.file, {.defines = command.scene.defines});
+  const LoadedScene loaded = load(command.scene);
   for (const std::string& notice : loaded.notices) print_notice(notice);
   const MaxDepth depth = max_depth(loaded, LangevinOptions{}.max_depth);
   if (!command.max_depth && !depth.notice.empty()) print_notice(depth.notice);

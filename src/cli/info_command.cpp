@@ -15,9 +15,9 @@
 #include "cli/commands.h"
 #include "cli/max_depth.h"
 #include "cli/print.h"
+#include "cli/scene.h"
 #include "cli/scene_limits.h"
 #include "driftlight/options.h"
-#include "driftlight/scene_file.h"
 
 namespace driftlight::cli {
 
@@ -105,6 +105,12 @@ std::string depth_text(const LoadedScene& loaded) {
                               : fmt::format("{} edges ({})", depth.edges, depth.notice);
 }
 
+std::string sample_text(const LoadedScene& loaded) {
+  return loaded.sample_count
+             ? fmt::format("{} per pixel, the default of --spp", *loaded.sample_count)
+             : "not given";
+}
+
 /// The integrator's line, and below it one line an option, in columns.
 template <class Options>
 std::string describe_integrator(std::string_view name, std::string_view method) {
@@ -129,7 +135,7 @@ std::string describe_integrator(std::string_view name, std::string_view method) 
 }  // namespace
 
 void run(const InfoCommand& command) {
-  const LoadedScene loaded = load_scene(command.scene.file, {.defines = command.scene.defines});
+  const LoadedScene loaded = load(command.scene);
   const Scene& scene = loaded.scene;
   constexpr std::array<std::string_view, 13> kBsdfs{
       "diffuse", "conductor",    "roughconductor", "dielectric", "roughdielectric", "phong", "ward",
@@ -141,6 +147,7 @@ void run(const InfoCommand& command) {
               fmt::format("{} x {} pixels", scene.camera().film_width, scene.camera().film_height));
   text += row("camera", describe_camera(scene.camera()));
   text += row("max depth", depth_text(loaded));
+  text += row("samples", sample_text(loaded));
   text += row("bounds", describe_bounds(scene));
   text += row("shapes", list_shapes(scene.shapes()));
   text += row("bsdfs", list(count_kinds(scene.bsdfs()), kBsdfs));
@@ -148,7 +155,9 @@ void run(const InfoCommand& command) {
   text += row("emitters", list(count_kinds(scene.emitters()), kEmitters));
   text += row("memory", fmt::format("{:.3g} MB of meshes and bitmaps, without Embree's trees",
                                     1e-6 * static_cast<double>(memory_of(scene))));
-  for (const std::string& limit : limits_of(scene)) text += row("limit", limit);
+  text += row("hash", identity_of(command.scene, loaded).hash);
+  for (const IntegratorLimits& limits : limits_of(scene))
+    text += row(name_of(limits.integrator), limits.text);
   for (const std::string& notice : loaded.notices) text += row("notice", notice);
   print(text);
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/integrator.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <type_traits>
 
@@ -151,6 +153,16 @@ std::string take_depth(const LoadedScene& loaded, const Settings& settings,
         return std::move(depth.notice);
       },
       options);
+}
+
+std::string take_sample_count(const LoadedScene& loaded, const IntegratorOptions& options,
+                              Work& work) {
+  const bool given = work.time || work.samples_per_pixel;
+  if (given || counts_mutations(options) || !loaded.sample_count) return "";
+  work.samples_per_pixel = loaded.sample_count;
+  return fmt::format(
+      "{} samples per pixel, as the scene's sampler says; --spp gives another number",
+      *loaded.sample_count);
 }
 
 bool counts_mutations(const IntegratorOptions& options) {

@@ -37,6 +37,11 @@ void apply(const Settings& settings, IntegratorOptions& options);
 std::string take_depth(const LoadedScene& loaded, const Settings& settings,
                        IntegratorOptions& options);
 
+/// If samples are the work and it is not given, takes it from the scene. A notice, empty if there
+/// is nothing to say.
+std::string take_sample_count(const LoadedScene& loaded, const IntegratorOptions& options,
+                              Work& work);
+
 /// True if mutations are its work, else samples are.
 bool counts_mutations(const IntegratorOptions& options);
 

@@ -11,10 +11,10 @@
 #include "cli/print.h"
 #include "cli/progress_bar.h"
 #include "cli/report.h"
+#include "cli/scene.h"
 #include "cli/text_file.h"
 #include "driftlight/image.h"
 #include "driftlight/render.h"
-#include "driftlight/scene_file.h"
 #include "driftlight/step_layers.h"
 #include "pending_file.h"
 #include "stopwatch.h"
@@ -115,11 +115,16 @@ void run(const RenderCommand& command) {
   check_outputs(command);
 
   const Stopwatch watch;
-  const LoadedScene loaded = load_scene(command.scene.file, {.defines = command.scene.defines});
+  const LoadedScene loaded = load(command.scene);
   const double load_seconds = watch.seconds();
   for (const std::string& notice : loaded.notices) talk.notice(notice);
   const std::string depth_notice = take_depth(loaded, command.settings, options);
   if (!depth_notice.empty()) talk.notice(depth_notice);
+
+  const SceneIdentity identity = identity_of(command.scene, loaded);
+  Work work = command.work;
+  const std::string sample_notice = take_sample_count(loaded, options, work);
+  if (!sample_notice.empty()) talk.notice(sample_notice);
 
   RenderOptions how;
   how.threads = command.threads;
@@ -139,12 +144,13 @@ void run(const RenderCommand& command) {
   auto [image, report] = [&] {
     ProgressBar bar(!talk.quiet());
     how.progress = [&](const Progress& progress) { bar.update(progress); };
-    return render_with(loaded.scene, options, how, command.work);
+    return render_with(loaded.scene, options, how, work);
   }();
   if (report.empty) throw RuntimeError("stopped before there was an image; nothing is written");
   if (report.stopped) talk.notice("stopped early: the image holds what was rendered so far");
   for (const std::string& warning : report.warnings) talk.notice(warning);
   report.statistics["seconds"]["load"] = load_seconds;
+  add_scene(identity, report.metadata, report.statistics);
   write_outputs(command, image, loaded.tone_mapping, how, report, talk);
   if (!report.failure.empty()) throw RuntimeError(report.failure);
 }

@@ -44,19 +44,30 @@ std::size_t memory_of(const Scene& scene) {
   return sum;
 }
 
-std::vector<std::string> limits_of(const Scene& scene) {
-  std::vector<std::string> lines;
+std::vector<IntegratorLimits> limits_of(const Scene& scene) {
   const Camera& camera = scene.camera();
-  if (camera.has_lens() || camera.is_orthographic())
-    lines.emplace_back("mlt and erpt cannot render it: they need a pinhole");
-  if (!has_smooth_surface(scene)) return lines;
-  lines.emplace_back("light misses what is seen by way of smooth mirrors and glass");
-  if (!has_unhittable_emitter(scene)) return lines;
-  lines.emplace_back(
-      "path misses light of point, spot and directional emitters by way of smooth mirrors and "
-      "glass");
-  lines.emplace_back("all miss such light where it is seen by way of smooth mirrors and glass");
-  return lines;
+  const bool is_pinhole = !camera.has_lens() && !camera.is_orthographic();
+  const bool is_smooth = has_smooth_surface(scene);
+  const bool is_unhittable = is_smooth && has_unhittable_emitter(scene);
+  const auto text = [&](Integrator integrator) -> std::string {
+    const bool by_perturbations = integrator == Integrator::Mlt || integrator == Integrator::Erpt;
+    if (by_perturbations && !is_pinhole) return "nothing: it needs a pinhole";
+    if (integrator == Integrator::Light && is_smooth)
+      return "all but what is seen by way of smooth mirrors and glass";
+    if (!is_unhittable) return "all";
+    if (integrator == Integrator::Path)
+      return "all but light of point, spot and directional emitters by way of smooth mirrors and "
+             "glass";
+    return "all but light of point, spot and directional emitters by way of smooth mirrors and "
+           "glass that is seen by way of such";
+  };
+  std::vector<IntegratorLimits> result;
+  for (const Integrator integrator :
+       {Integrator::Langevin, Integrator::Pssmlt, Integrator::Mmlt, Integrator::H2mc,
+        Integrator::Lmc, Integrator::Mlt, Integrator::Erpt, Integrator::Path, Integrator::Bdpt,
+        Integrator::Light})
+    result.push_back({integrator, text(integrator)});
+  return result;
 }
 
 }  // namespace driftlight::cli

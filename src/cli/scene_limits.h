@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bsdf_textures.h"
+#include "cli/arguments.h"
 #include "driftlight/scene.h"
 
 namespace driftlight::cli {
@@ -26,8 +27,13 @@ void for_each_texture(const Scene& scene, const Visit& visit) {
 /// Bytes of meshes and bitmaps, without Embree's trees.
 std::size_t memory_of(const Scene& scene);
 
-/// A line for each kind of light that some integrators miss, or for why they cannot render the
-/// scene; none if all render all of it.
-std::vector<std::string> limits_of(const Scene& scene);
+/// What an integrator finds of a scene's light.
+struct IntegratorLimits {
+  Integrator integrator;
+  std::string text;  ///< "all", "all but ..", or why it finds nothing
+};
+
+/// Of each integrator, with the defaults of its options, in their order.
+std::vector<IntegratorLimits> limits_of(const Scene& scene);
 
 }  // namespace driftlight::cli

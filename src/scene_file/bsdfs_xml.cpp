@@ -22,14 +22,15 @@ namespace {
 /// Mitsuba's remedy for materials that reflect more than they receive: textures that act together
 /// are scaled so that their maxima sum to 0.99, unless ensureEnergyConservation is false.
 void conserve_energy(Properties& properties, LoadContext& context,
-                     std::initializer_list<Texture*> textures) {
+                     std::initializer_list<Texture*> textures,
+                     const std::string& what = "reflectance") {
   if (!properties.boolean("ensureEnergyConservation", true)) return;
   Rgbd sum = Rgbd::Zero();
   for (const Texture* texture : textures) sum += texture->maximum_color();
   if (sum.maxCoeff() <= 1.0) return;
   const double factor = 0.99 / sum.maxCoeff();
   for (Texture* texture : textures) scale(*texture, Rgbd::Constant(factor));
-  context.notice(properties.element(), "the reflectance of " + properties.description() +
+  context.notice(properties.element(), "the " + what + " of " + properties.description() +
                                            " exceeds 1 and is scaled by " + std::to_string(factor) +
                                            ", as in Mitsuba");
 }
@@ -46,17 +47,19 @@ Texture read_scattering(Properties& properties, LoadContext& context, std::strin
 struct Alpha {
   double u, v;
 };
-/// `alpha` of both, or each by its name.
+/// `alpha` of both, or each by its name. Those of a ward are `alpha` where they are not given.
 Alpha read_alpha(Properties& properties, LoadContext& context) {
   constexpr double kLeast = 1e-4;
   const bool by_axis = properties.has("alphaU") || properties.has("alphaV");
-  if (by_axis && properties.has("alpha"))
-    properties.fail("alpha", "give either 'alpha' or 'alphaU' and 'alphaV'");
-  if (by_axis && properties.type() != "ward" &&
-      !(properties.has("alphaU") && properties.has("alphaV")))
-    properties.element().fail("'alphaU' and 'alphaV' need each other");
-  const double u = properties.non_negative(by_axis ? "alphaU" : "alpha", 0.1);
-  const double v = by_axis ? properties.non_negative("alphaV", 0.1) : u;
+  if (by_axis && properties.type() != "ward") {
+    if (properties.has("alpha"))
+      properties.fail("alpha", "give either 'alpha' or 'alphaU' and 'alphaV'");
+    if (!(properties.has("alphaU") && properties.has("alphaV")))
+      properties.element().fail("'alphaU' and 'alphaV' need each other");
+  }
+  const double alpha = properties.non_negative("alpha", 0.1);
+  const double u = properties.non_negative("alphaU", alpha);
+  const double v = properties.non_negative("alphaV", alpha);
   if (std::min(u, v) < kLeast)
     context.notice(properties.element(), "roughness is raised to 0.0001, as in Mitsuba");
   return {std::max(u, kLeast), std::max(v, kLeast)};
@@ -79,11 +82,11 @@ Bsdf read_diffuse(Properties& properties, LoadContext& context) {
       properties, context, long_name ? "diffuseReflectance" : "reflectance", Rgbd::Constant(0.5))};
 }
 
-/// eta and k of a metal: by name, where given by value, over the index outside. Without a name
-/// Mitsuba 0.6 takes copper, Mitsuba 3 what reflects everything.
+/// eta and k of a metal: by name, where given by value, over the index outside, which in Mitsuba 3
+/// is that of vacuum. Without a name Mitsuba 0.6 takes copper, Mitsuba 3 what reflects everything.
 void read_metal(Properties& properties, LoadContext& context, Rgbd& eta, Rgbd& k) {
-  const std::string name = properties.text("material")
-                               .value_or(properties.dialect() == Dialect::Mitsuba3 ? "none" : "Cu");
+  const bool newer = properties.dialect() == Dialect::Mitsuba3;
+  const std::string name = properties.text("material").value_or(newer ? "none" : "Cu");
   eta = Rgbd::Zero();
   k = Rgbd::Ones();
   if (lower_case(name) != "none") {
@@ -94,7 +97,7 @@ void read_metal(Properties& properties, LoadContext& context, Rgbd& eta, Rgbd& k
       context.notice(properties.element(), "metal '" + name + "' as measured by " + metal.source +
                                                "; Mitsuba's own table may differ a little");
   }
-  const double outside = read_index(properties, "extEta", "air");
+  const double outside = newer ? 1.0 : read_index(properties, "extEta", "air");
   eta = properties.color("eta", eta) / outside;
   k = properties.color("k", k) / outside;
 }
@@ -206,13 +209,15 @@ std::shared_ptr<const BsdfBox> boxed(const Bsdf& bsdf) {
   return std::make_shared<const BsdfBox>(BsdfBox{bsdf});
 }
 
-/// A texture that may also be given as one number.
-Texture read_scalar(Properties& properties, std::string_view name, double fallback,
-                    LoadContext& context) {
-  const std::optional<Element> child = properties.find(name);
-  if (child && child->tag() == "float")
-    return Texture(Rgbd::Constant(properties.non_negative(name, fallback)));
-  return read_textured(properties, name, Rgbd::Constant(fallback), context);
+/// By colour in Mitsuba 0.6, one number in 3.
+Texture read_opacity(Properties& properties, LoadContext& context) {
+  constexpr double kDefault = 0.5;
+  if (properties.dialect() == Dialect::Mitsuba3)
+    return read_share(properties, "opacity", kDefault, context);
+  Texture opacity = read_scalar(properties, "opacity", kDefault, context);
+  conserve_energy(properties, context, {&opacity}, "opacity");
+  if (opacity.maximum() > 1.0) properties.fail("opacity", "must be between 0 and 1");
+  return opacity;
 }
 
 /// Each side masks its own BSDF. Black back sides let pass too.
@@ -222,8 +227,7 @@ Surface read_mask(Properties& properties, LoadContext& context) {
   const std::shared_ptr<Surface> surface = read_surface(nested.front(), context);
   if (delta_eta(surface->front) != 1.0)
     nested.front().fail("a smooth dielectric cannot be nested in a mask: a thindielectric can");
-  const Texture opacity = read_scalar(properties, "opacity", 0.5, context);
-  if (opacity.maximum() > 1.0) properties.fail("opacity", "must be between 0 and 1");
+  const Texture opacity = read_opacity(properties, context);
   const auto masked = [&](const Bsdf& bsdf) { return Mask{opacity, boxed(bsdf)}; };
   Surface result{masked(surface->front), std::nullopt, std::nullopt, surface->relief};
   if (surface->back)
@@ -259,33 +263,11 @@ Surface blend(const Element& element, const Texture& weight, const Surface& firs
   return result;
 }
 
-/// One number from the colours of a texture: their mean in Mitsuba 0.6, their luminance in 3.
-Texture read_weight(Properties& properties, LoadContext& context) {
-  if (!properties.has("weight")) properties.element().fail("a blendbsdf needs a 'weight'");
-  Texture texture = read_scalar(properties, "weight", 0.0, context);
-  if (texture.maximum() > 1.0) properties.fail("weight", "must be between 0 and 1");
-  const bool newer = properties.dialect() == Dialect::Mitsuba3;
-  const Rgbd factors = newer ? kLuminance : Rgbd::Constant(1.0 / 3.0);
-  const auto gray = [&](const Rgbd& color) {
-    return Rgbd(Rgbd::Constant((factors * texture.scale * color).sum()));
-  };
-  texture.color = Rgbd::Constant((factors * texture.color).sum());
-  if (texture.pattern) {
-    texture.pattern->color0 = gray(texture.pattern->color0);
-    texture.pattern->color1 = gray(texture.pattern->color1);
-  }
-  if (texture.bitmap != nullptr) {
-    Bitmap bitmap = *texture.bitmap;
-    for (Eigen::Array3f& texel : bitmap.texels)
-      texel = gray(texel.cast<double>()).cast<float>().min(1.0F);
-    texture.bitmap = std::make_shared<const Bitmap>(std::move(bitmap));
-  }
-  texture.scale = kWhite;
-  return texture;
-}
-
+/// Only Mitsuba 0.6 has a default for the weight.
 Surface read_blend(Properties& properties, LoadContext& context) {
-  const Texture weight = read_weight(properties, context);
+  if (properties.dialect() == Dialect::Mitsuba3 && !properties.has("weight"))
+    properties.element().fail("a blendbsdf needs a 'weight'");
+  const Texture weight = read_share(properties, "weight", 0.5, context);
   const std::vector<Element> nested = properties.nested({"bsdf", "ref"});
   if (nested.size() != 2) properties.element().fail("a blendbsdf needs two nested bsdfs");
   const std::shared_ptr<Surface> first = read_surface(nested[0], context);
@@ -296,7 +278,7 @@ Surface read_blend(Properties& properties, LoadContext& context) {
 /// sum_i w_i f_i, one blend after the other; black where the weights sum to less than 1.
 Surface read_mixture(Properties& properties, LoadContext& context) {
   std::vector<double> weights;
-  for (const std::string& part : split_list(properties.required_text("weights"))) {
+  for (const std::string& part : split(properties.required_text("weights"), ",; \t\r\n")) {
     const std::optional<double> weight = parse_number(part);
     if (!weight || !(*weight >= 0.0))
       properties.fail("weights", "'" + part + "' is not a number that is at least 0");
@@ -368,6 +350,8 @@ Surface read_two_sided(Properties& properties, LoadContext& context) {
     sides.push_back(side->front);
   }
   properties.ignore({"ensureEnergyConservation"});
+  // In Mitsuba 3 it allows what transmits to be nested, which has failed above.
+  if (properties.dialect() == Dialect::Mitsuba3) properties.boolean("allowTransmission", false);
   return {sides.front(), sides.back(), std::nullopt, relief};
 }
 

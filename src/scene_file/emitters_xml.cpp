@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "bsdfs_xml.h"
 #include "color_xml.h"
 #include "daylight.h"
 #include "properties.h"
@@ -79,7 +80,7 @@ void read_environment_map(Properties& properties, LoadContext& context) {
   const Eigen::Matrix3d to_world = read_rotation(properties);
   properties.ignore({"cache", "misCompensation"});
   with_location(properties.element(), [&] {
-    Bitmap bitmap = read_bitmap(properties.element().find_file(file), gamma);
+    Bitmap bitmap = read_image_file(properties.element().find_file(file), gamma).bitmap;
     const bool black = std::all_of(bitmap.texels.begin(), bitmap.texels.end(),
                                    [](const auto& texel) { return (texel == 0.0F).all(); });
     if (black || scale == 0.0) throw InputError("the environment map is black");
@@ -216,9 +217,11 @@ void read_sun(Properties& properties, LoadContext& context) {
 
 void read_sun_and_sky(Properties& properties, LoadContext& context) {
   note_sky(properties, context);
-  if (properties.dialect() == Dialect::Mitsuba3) properties.ignore({"complexSun"});
-  const double sky_scale = properties.non_negative("skyScale", 1.0);
-  add_daylight(properties, context, sky_scale, properties.non_negative("sunScale", 1.0));
+  const bool newer = properties.dialect() == Dialect::Mitsuba3;
+  if (newer) properties.ignore({"complexSun"});
+  const double both = newer ? 1.0 : properties.non_negative("scale", 1.0);
+  const double sky_scale = properties.non_negative("skyScale", both);
+  add_daylight(properties, context, sky_scale, properties.non_negative("sunScale", both));
 }
 
 void reject_area(Properties& properties, LoadContext&) {
@@ -241,14 +244,33 @@ constexpr std::array<std::pair<std::string_view, EmitterReader>, 9> kEmitters{{
 }  // namespace
 
 void read_emitter(const Element& element, LoadContext& context) {
+  if (context.objects.is_read(element)) return;
   Properties properties(element);
-  find_plugin(kEmitters, properties)(properties, context);
+  // It lights up where a shape refers to it.
+  if (properties.type() == "area" && element.dialect() == Dialect::Mitsuba3) {
+    read_area_radiance(element, context);
+    return;
+  }
   properties.ignore({"samplingWeight"});
+  find_plugin(kEmitters, properties)(properties, context);
   properties.finish();
+  context.has_emitter = true;
   context.objects.define(element, NamedObjects::Other{});
 }
 
+bool is_area_emitter(const Element& element, LoadContext& context) {
+  if (element.tag() == "emitter") return true;
+  if (element.tag() != "ref" || element.dialect() != Dialect::Mitsuba3) return false;
+  context.objects.read_ahead(element, "emitter",
+                             [&](const Element& target) { read_emitter(target, context); });
+  context.objects.read_ahead(element, "bsdf",
+                             [&](const Element& target) { read_surface(target, context); });
+  return context.objects.names<NamedObjects::Radiance>(element);
+}
+
 Texture read_area_radiance(const Element& element, LoadContext& context) {
+  if (element.tag() == "ref")
+    return context.objects.resolve<NamedObjects::Radiance>(element, "area emitter").texture;
   Properties properties(element);
   if (properties.type() != "area")
     element.fail("unknown " + properties.description() + " in a shape; valid are: area");
@@ -257,7 +279,7 @@ Texture read_area_radiance(const Element& element, LoadContext& context) {
     properties.fail("radiance", "vertex colours cannot be a radiance");
   properties.ignore({"samplingWeight"});
   properties.finish();
-  context.objects.define(element, NamedObjects::Other{});
+  context.objects.define(element, NamedObjects::Radiance{radiance});
   return radiance;
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 #include "driftlight/error.h"
 #include "spectrum.h"
@@ -32,7 +33,8 @@ float decode(float encoded, const Gamma& gamma) {
 
 }  // namespace
 
-Bitmap read_bitmap(const std::filesystem::path& file, const std::optional<Gamma>& gamma_override) {
+ImageFile read_image_file(const std::filesystem::path& file,
+                          const std::optional<Gamma>& gamma_override) {
   // Mitsuba does not multiply colours by alpha.
   OIIO::ImageSpec config;
   config["oiio:UnassociatedAlpha"] = 1;
@@ -61,7 +63,7 @@ Bitmap read_bitmap(const std::filesystem::path& file, const std::optional<Gamma>
     if (!bitmap.texels[i].isFinite().all())
       throw InputError("the image '" + file.string() + "' has a value that is not finite");
   }
-  return bitmap;
+  return {std::move(bitmap), gamma};
 }
 
 }  // namespace driftlight

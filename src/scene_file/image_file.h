@@ -12,9 +12,15 @@ namespace driftlight {
 /// How to undo the encoding of an image: a power, or nothing for the sRGB curve.
 using Gamma = std::optional<double>;
 
+struct ImageFile {
+  Bitmap bitmap;
+  Gamma gamma;  ///< that was undone
+};
+
 /// Reads an image into linear sRGB; alpha is dropped, grey is spread over three channels, negative
 /// values become 0. Without an override, floating-point files are linear, and the others are sRGB
 /// unless they name a gamma. Throws InputError.
-Bitmap read_bitmap(const std::filesystem::path& file, const std::optional<Gamma>& gamma_override);
+ImageFile read_image_file(const std::filesystem::path& file,
+                          const std::optional<Gamma>& gamma_override);
 
 }  // namespace driftlight

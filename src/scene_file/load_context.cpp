@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "text.h"
+#include "nearest_names.h"
 
 namespace driftlight {
 
@@ -12,6 +12,10 @@ void NamedObjects::define(const Element& element, Object object) {
   if (!id) return;
   if (!objects_.emplace(*id, Entry{element, std::move(object)}).second)
     element.fail("the id '" + *id + "' is already taken");
+}
+
+void NamedObjects::define_failed(const Element& element) {
+  for (const std::string& id : element.ids()) objects_.emplace(id, Entry{element, Failed{}});
 }
 
 void NamedObjects::define_alias(const Element& alias) {
@@ -36,7 +40,11 @@ std::optional<Element> NamedObjects::find_ahead(const Element& ref, std::string_
 const NamedObjects::Object& NamedObjects::find(const Element& ref) const {
   ref.allow_attributes({"id", "name"});
   const std::string id = ref.text("id");
-  if (const auto found = objects_.find(id); found != objects_.end()) return found->second.object;
+  if (const auto found = objects_.find(id); found != objects_.end()) {
+    if (std::holds_alternative<Failed>(found->second.object))
+      throw Unreadable(ref.location(), "'" + id + "' could not be read");
+    return found->second.object;
+  }
 
   if (const auto target = ref.find_id(id)) {
     if (ref.is_inside(*target)) ref.fail("cyclic reference: '" + id + "' contains this <ref>");
@@ -49,8 +57,8 @@ const NamedObjects::Object& NamedObjects::find(const Element& ref) const {
 void NamedObjects::fail_unknown(const Element& element) const {
   std::vector<std::string> known;
   for (const auto& [name, entry] : objects_) known.push_back(name);
-  element.fail("nothing has the id '" + element.text("id") +
-               "'; valid are: " + (known.empty() ? "none" : join(known)));
+  const std::string id = element.text("id");
+  element.fail("nothing has the id '" + id + "'; " + hint(id, known));
 }
 
 }  // namespace driftlight

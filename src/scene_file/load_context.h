@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -41,17 +42,31 @@ struct ShapeGroup {
   std::size_t triangles = 0;
 };
 
+/// Something refers to an element that could not be read, which is an error already.
+class Unreadable : public SceneError {
+ public:
+  using SceneError::SceneError;
+};
+
 /// Elements by id, for <ref>. In the older dialect only those above a <ref> are known to it, as in
 /// Mitsuba; in the newer one a bsdf or texture further down is read when it is needed.
 class NamedObjects {
  public:
   /// Something with an id that no <ref> may ask for.
   struct Other {};
-  using Object =
-      std::variant<Other, std::shared_ptr<Surface>, std::shared_ptr<const ShapeGroup>, Texture>;
+  /// Something that could not be read.
+  struct Failed {};
+  /// <emitter type="area">
+  struct Radiance {
+    Texture texture;
+  };
+  using Object = std::variant<Other, Failed, std::shared_ptr<Surface>,
+                              std::shared_ptr<const ShapeGroup>, Texture, Radiance>;
 
   /// Registers the element if it has an id. Throws SceneError if the id is taken.
   void define(const Element& element, Object object);
+  /// Registers the element, and all in it that has an id, as what could not be read.
+  void define_failed(const Element& element);
   /// <alias id="..." as="...">: a second id. Throws SceneError.
   void define_alias(const Element& alias);
 
@@ -75,18 +90,25 @@ class NamedObjects {
     const std::optional<Element> target = find_ahead(ref, tag);
     if (!target) return;
     pending_.push_back(*target);
-    read(*target);
+    try {
+      read(*target);
+    } catch (...) {
+      pending_.pop_back();
+      throw;
+    }
     pending_.pop_back();
   }
 
-  /// True if <ref id="..."/> names a T. Throws SceneError if it names nothing.
+  /// True if <ref id="..."/> names a T. Throws SceneError if it names nothing, Unreadable if that
+  /// could not be read.
   template <class T>
   bool names(const Element& ref) const {
     return std::holds_alternative<T>(find(ref));
   }
 
   /// The object that <ref id="..."/> names; `kind` ("bsdf") is for messages. Throws SceneError if
-  /// there is none, it is of another kind, is defined only further down, or contains the <ref>.
+  /// there is none, it is of another kind, is defined only further down, or contains the <ref>;
+  /// Unreadable if it could not be read.
   template <class T>
   T resolve(const Element& ref, const std::string& kind) const {
     const T* const object = std::get_if<T>(&find(ref));
@@ -112,18 +134,19 @@ struct LoadContext {
   Surroundings surroundings;
   SceneBuilder builder;
   NamedObjects objects;
-  std::vector<std::string> notices;
   ToneMapping tone_mapping = {};
+  std::optional<int> sample_count = {};  ///< samples per pixel that the scene asks for
   std::size_t shape_count = 0;
   std::size_t instanced_triangles = 0;
+  bool has_emitter = false;
+  /// Decoded as sRGB, though the scene does not ask for it.
+  std::set<std::shared_ptr<const Bitmap>> assumed_srgb = {};
 
-  /// Of very many notices only the first are kept.
   void notice(const Element& element, const std::string& message) {
-    constexpr std::size_t kMaximumNotices = 200;
-    if (notices.size() < kMaximumNotices)
-      notices.push_back(to_string(element.location()) + ": " + message);
-    else if (notices.size() == kMaximumNotices)
-      notices.emplace_back("further notices are left out");
+    notice(element.location(), message);
+  }
+  void notice(const SourceLocation& at, const std::string& message) {
+    surroundings.messages.notice(at, message);
   }
 };
 

@@ -4,14 +4,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <optional>
 #include <sstream>
 #include <utility>
 #include <vector>
 
 #include "bsdfs_xml.h"
+#include "excerpt.h"
 #include "text.h"
 
 namespace driftlight {
@@ -39,6 +42,11 @@ bool is_zero(const std::string& numbers) {
                      [](const std::string& part) { return parse_number(part) == 0.0; });
 }
 
+bool is_glass(const MtlMaterial& material) {
+  constexpr std::array kGlass{4, 6, 7, 9};
+  return std::find(kGlass.begin(), kGlass.end(), material.illum) != kGlass.end();
+}
+
 std::string escaped(const std::string& text) {
   std::string result;
   for (const char c : text) {
@@ -61,12 +69,16 @@ class MtlParser {
     std::ifstream stream(file);
     if (!stream || std::filesystem::is_directory(file))
       throw SceneError({file_}, "the file cannot be opened");
+    text_ = {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+    std::istringstream lines(text_);
     std::string line;
-    while (std::getline(stream, line)) {
+    while (std::getline(lines, line)) {
       ++line_;
       parse(line);
     }
   }
+
+  const std::string& text() const { return text_; }
 
   const std::vector<MtlMaterial>& materials() const { return materials_; }
 
@@ -117,7 +129,8 @@ class MtlParser {
     for (std::string& word : result)
       if (!(words >> word) || !parse_number(word) || std::abs(*parse_number(word)) > 1e9)
         throw SceneError({file_, line_, 1},
-                         fmt::format("'{}' needs {} numbers, not '{}'", key, count, word));
+                         fmt::format("'{}' needs {} numbers, not '{}'", key, count, word) +
+                             excerpt(text_, {file_, line_, 1}));
     return join(result);
   }
   static std::string image(std::istringstream& words) {
@@ -128,6 +141,7 @@ class MtlParser {
   }
 
   std::string file_;
+  std::string text_;
   int line_ = 0;
   std::vector<MtlMaterial> materials_;
 };
@@ -135,16 +149,20 @@ class MtlParser {
 /// Writes a material as an XML element on one line.
 class XmlWriter {
  public:
-  /// Images are looked for as files of `element`, of which notices speak, and in the directory.
-  XmlWriter(std::filesystem::path directory, const Element& element, LoadContext& context)
-      : directory_(std::move(directory)), element_(element), context_(context) {}
+  /// Images are looked for as files of `element`, of which notices speak, and beside the file.
+  XmlWriter(std::filesystem::path file, const Element& element, LoadContext& context)
+      : file_(std::move(file)), element_(element), context_(context) {}
 
   std::string bsdf(const MtlMaterial& material) {
     std::string result = scattering(material);
     if (material.bump)
       if (const auto texture = bitmap(*material.bump, "", true))
         result = "<bsdf type=\"bumpmap\">" + *texture + result + "</bsdf>";
-    if (material.mask) {
+    if (material.mask && is_glass(material)) {
+      context_.notice(SourceLocation{file_.string(), material.line, 1},
+                      "the opacity of the glass '" + material.name +
+                          "' is not used: a smooth dielectric cannot be masked");
+    } else if (material.mask) {
       const Paint& mask = *material.mask;
       const std::string opacity =
           mask.image ? paint(mask, "opacity")
@@ -158,17 +176,13 @@ class XmlWriter {
   std::string scattering(const MtlMaterial& material) {
     const bool has_gloss = (material.specular.image || !is_zero(material.specular.color)) &&
                            !is_zero(material.exponent);
+    if (is_glass(material)) return "<bsdf type=\"dielectric\"/>";
     switch (material.illum) {
       case 2:
         if (!has_gloss) break;
         return "<bsdf type=\"phong\">" + paint(material.diffuse, "diffuseReflectance") +
                paint(material.specular, "specularReflectance") +
                fmt::format(R"(<float name="exponent" value="{}"/></bsdf>)", material.exponent);
-      case 4:
-      case 6:
-      case 7:
-      case 9:
-        return "<bsdf type=\"dielectric\"/>";
       case 5:
       case 8:
         return R"(<bsdf type="conductor"><string name="material" value="Al"/></bsdf>)";
@@ -187,22 +201,29 @@ class XmlWriter {
 
   /// None if there is no such file.
   std::optional<std::string> bitmap(const std::string& image, const std::string& name, bool raw) {
-    const std::filesystem::path whole(image);
-    for (const auto& file : {directory_ / whole, directory_ / whole.filename(),
-                             element_.find_file(image), element_.find_file(whole.filename())}) {
-      if (!std::filesystem::is_regular_file(file)) continue;
+    if (const auto file = find_image(image))
       return fmt::format(R"(<texture name="{}" type="bitmap"><string name="filename" value="{}"/>)"
                          R"(<string name="filterType" value="bilinear"/>{}</texture>)",
-                         name, escaped(std::filesystem::absolute(file).string()),
+                         name, escaped(std::filesystem::absolute(*file).string()),
                          raw ? R"(<float name="gamma" value="1"/>)" : "");
-    }
     context_.notice(element_, "the image '" + image +
                                   "' of a material cannot be found and is taken as black, as in "
                                   "Mitsuba");
     return std::nullopt;
   }
 
-  std::filesystem::path directory_;
+  std::optional<std::filesystem::path> find_image(const std::string& image) const {
+    const std::filesystem::path whole(image);
+    const std::filesystem::path directory = file_.parent_path();
+    for (const auto& file : {directory / whole, directory / whole.filename()})
+      if (std::filesystem::is_regular_file(file)) return file;
+    for (const std::string& name : {image, whole.filename().string()})
+      if (const auto file = element_.find_file(name); std::filesystem::is_regular_file(file))
+        return file;
+    return std::nullopt;
+  }
+
+  std::filesystem::path file_;
   const Element& element_;
   LoadContext& context_;
 };
@@ -213,8 +234,9 @@ class XmlWriter {
 /// of its material, which messages then name.
 MaterialLibrary read_material_library(const std::filesystem::path& file, const Element& element,
                                       LoadContext& context) {
+  context.surroundings.files.add(file);
   const MtlParser parser(file);
-  XmlWriter writer(file.parent_path(), element, context);
+  XmlWriter writer(file, element, context);
   std::string text = "<materials>";
   int line = 1;
   for (const MtlMaterial& material : parser.materials()) {
@@ -222,7 +244,7 @@ MaterialLibrary read_material_library(const std::filesystem::path& file, const E
     line = material.line;
     text += writer.bsdf(material);
   }
-  const XmlDocument document(file, text + "</materials>");
+  const XmlDocument document(file, text + "</materials>", parser.text());
   const std::vector<Element> elements =
       Element(document, document.root(), context.surroundings).children();
   MaterialLibrary result;

@@ -19,8 +19,9 @@ using MaterialLibrary = std::map<std::string, std::shared_ptr<Surface>>;
 ///   illum 4, 6, 7, 9     dielectric
 ///   illum 5, 8           conductor of aluminium
 ///   other                diffuse
-/// under a bump map and a mask, where it has these. Textures that cannot be found are black, and
-/// named in a notice for the element that asked for the file. Throws SceneError.
+/// under a bump map and a mask, where it has these; glass has no mask, which a notice says.
+/// Textures that cannot be found are black, and named in a notice for the element that asked for
+/// the file. Throws SceneError.
 MaterialLibrary read_material_library(const std::filesystem::path& file, const Element& element,
                                       LoadContext& context);
 

@@ -63,14 +63,28 @@ std::vector<Vec3d> normal_sums(const TriangleMesh& mesh) {
   return sums;
 }
 
+/// Vertices of no triangle with an area need some direction, too.
+Eigen::Vector3f smooth_normal(const Vec3d& sum) {
+  const Vec3d normal = sum.norm() > 0.0 ? Vec3d(sum.normalized()) : Vec3d(1, 0, 0);
+  return normal.cast<float>();
+}
+
 void compute_smooth_normals(TriangleMesh& mesh) {
   const std::vector<Vec3d> sums = normal_sums(mesh);
   mesh.normals.resize(sums.size());
-  tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t i) {
-    // Vertices of no triangle with an area need some direction, too.
-    const Vec3d normal = sums[i].norm() > 0.0 ? Vec3d(sums[i].normalized()) : Vec3d(1, 0, 0);
-    mesh.normals[i] = normal.cast<float>();
-  });
+  tbb::parallel_for(std::size_t{0}, sums.size(),
+                    [&](std::size_t i) { mesh.normals[i] = smooth_normal(sums[i]); });
+}
+
+/// Returns how many there were.
+std::size_t fill_zero_normals(TriangleMesh& mesh) {
+  const auto is_zero = [](const Eigen::Vector3f& n) { return n.isZero(0.0F); };
+  const auto count = std::count_if(mesh.normals.begin(), mesh.normals.end(), is_zero);
+  if (count == 0) return 0;
+  const std::vector<Vec3d> sums = normal_sums(mesh);
+  for (std::size_t i = 0; i < sums.size(); ++i)
+    if (is_zero(mesh.normals[i])) mesh.normals[i] = smooth_normal(sums[i]);
+  return static_cast<std::size_t>(count);
 }
 
 /// Of a vertex: position, normal and texture coordinates; the latter two zero where absent.
@@ -206,15 +220,17 @@ void split_at_creases(TriangleMesh& mesh, double maximum_angle) {
   mesh = std::move(split);
 }
 
-void finish_normals(TriangleMesh& mesh, bool face_normals, bool flip) {
+std::size_t finish_normals(TriangleMesh& mesh, bool face_normals, bool flip) {
   if (face_normals) {
     mesh.normals.clear();
     if (flip) reverse_winding(mesh);
-    return;
+    return 0;
   }
   if (mesh.normals.empty()) compute_smooth_normals(mesh);
+  const std::size_t filled = fill_zero_normals(mesh);
   if (flip)
     for (Eigen::Vector3f& n : mesh.normals) n = -n;
+  return filled;
 }
 
 }  // namespace driftlight

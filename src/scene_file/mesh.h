@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <vector>
 
 #include "driftlight/scene.h"
@@ -13,6 +14,7 @@ namespace driftlight {
 struct ColoredMesh {
   TriangleMesh mesh;
   std::vector<Eigen::Vector3f> colors;  ///< of the vertices; empty, or one for each
+  bool face_normals = false;            ///< its faces are to look flat
 };
 
 /// Throws InputError if the mesh is empty, or has an index out of range or a number that is not
@@ -35,7 +37,8 @@ void split_at_creases(TriangleMesh& mesh, double maximum_angle);
 
 /// Mitsuba's rules for normals. `face_normals` discards them; otherwise a mesh without any gets
 /// smooth ones: means of the normals of the triangles around a vertex, weighted by their angles at
-/// it (Thuermer and Wuethrich 1998). `flip` turns all to the other side.
-void finish_normals(TriangleMesh& mesh, bool face_normals, bool flip);
+/// it (Thuermer and Wuethrich 1998). `flip` turns all to the other side. Beyond Mitsuba's rules, a
+/// normal that is zero becomes the smooth one. Returns how many those were.
+std::size_t finish_normals(TriangleMesh& mesh, bool face_normals, bool flip);
 
 }  // namespace driftlight

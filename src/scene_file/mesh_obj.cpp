@@ -7,12 +7,15 @@
 #include <cstdint>
 #include <fstream>
 #include <istream>
+#include <iterator>
 #include <map>
 #include <sstream>
 #include <string>
 
 #include "driftlight/error.h"
+#include "excerpt.h"
 #include "mesh.h"
+#include "obj_lines.h"
 
 namespace driftlight {
 namespace {
@@ -89,7 +92,9 @@ class LibraryNames : public tinyobj::MaterialReader {
   Piece& piece_;
 };
 
+/// The parser takes what it does not understand for zeros, so that the lines are looked at before.
 Piece parse(const std::string& lines) {
+  if (const auto problem = find_unreadable_line(lines)) throw InputError(problem->message);
   Piece result;
   LibraryNames libraries(result);
   std::istringstream stream(lines);
@@ -214,7 +219,7 @@ class ObjReader {
   std::uint32_t new_vertex(const Corner& corner) {
     const bool has_normal = corner.normal != kNone;
     const bool has_uv = corner.uv != kNone;
-    (has_normal ? has_normals_ : lacks_normals_) = true;
+    has_normals_ |= has_normal;
     has_uvs_ |= has_uv;
     mesh_.positions.push_back(positions_[corner.position]);
     mesh_.normals.push_back(has_normal ? normals_[corner.normal] : Eigen::Vector3f::Zero());
@@ -224,15 +229,13 @@ class ObjReader {
 
   void finish_mesh() {
     if (mesh_.triangles.empty()) return;
-    if (has_normals_ && lacks_normals_)
-      throw InputError("some faces of a group have normals and others have not");
     if (!has_normals_) mesh_.normals.clear();
     if (!has_uvs_) mesh_.uvs.clear();
     check_mesh(mesh_);
     merge_equal_vertices(mesh_);
     file_.parts.push_back({std::move(mesh_), material_});
     mesh_ = {};
-    has_normals_ = lacks_normals_ = has_uvs_ = false;
+    has_normals_ = has_uvs_ = false;
   }
 
   ObjOptions options_;
@@ -244,14 +247,23 @@ class ObjReader {
   std::string material_;
   std::vector<Seen> seen_;  ///< at each position
   bool has_normals_ = false;
-  bool lacks_normals_ = false;
   bool has_uvs_ = false;
 };
+
+/// What some programs put before a text in UTF-8.
+void skip_byte_order_mark(std::istream& stream) {
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";
+  std::string start(kMark.size(), '\0');
+  stream.read(start.data(), static_cast<std::streamsize>(start.size()));
+  stream.clear();
+  if (start != kMark) stream.seekg(0);
+}
 
 /// Pieces are parsed side by side, some at a time, which bounds the memory.
 ObjFile read_pieces(std::istream& stream, const ObjOptions& options) {
   constexpr std::size_t kAtATime = 16;
   ObjReader reader(options);
+  skip_byte_order_mark(stream);
   tbb::parallel_pipeline(
       kAtATime, tbb::make_filter<void, std::string>(tbb::filter_mode::serial_in_order,
                                                     [&](tbb::flow_control& control) {
@@ -274,6 +286,11 @@ ObjFile read_obj(const std::filesystem::path& file, const ObjOptions& options) {
   try {
     return read_pieces(stream, options);
   } catch (const InputError& error) {
+    // Only now it matters which line it was.
+    std::ifstream again(file, std::ios::binary);
+    const std::string text{std::istreambuf_iterator<char>(again), std::istreambuf_iterator<char>()};
+    if (const auto problem = find_obj_problem(text))
+      throw InputError(problem_in_line(file, text, problem->line, problem->message));
     throw InputError("the mesh '" + file.string() + "' is not usable: " + error.what());
   }
 }

@@ -25,7 +25,9 @@ struct ObjOptions {
   bool flip_tex_coords = false;  ///< v becomes 1 - v
 };
 
-/// Polygons become fans of triangles; equal vertices are merged. Throws InputError.
+/// Polygons become fans of triangles; equal vertices are merged. Where only some faces of a part
+/// have normals, those of the others are zero. Throws InputError that names the line, if it is one
+/// that is wrong.
 ObjFile read_obj(const std::filesystem::path& file, const ObjOptions& options);
 
 }  // namespace driftlight

@@ -9,12 +9,14 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <functional>
 #include <string_view>
 
 #include "driftlight/error.h"
+#include "excerpt.h"
 #include "ply_header.h"
 #include "text.h"
 
@@ -59,6 +61,15 @@ class PlyValues {
     return 0.0;
   }
 
+  /// Of a text it must fit.
+  float next_float(PlyType type) {
+    const double value = next(type);
+    const auto result = static_cast<float>(value);
+    if (is_text() && !std::isfinite(result))
+      throw InputError(fmt::format("{:g} does not fit single precision", value));
+    return result;
+  }
+
   /// Throws InputError unless there can be `count` rows of so many bytes (binary) or values (text)
   /// each. It bounds what a corrupt header can make us allocate.
   void expect(const PlyElement& element) const {
@@ -71,6 +82,8 @@ class PlyValues {
   }
 
   bool is_text() const { return encoding_ == PlyEncoding::Ascii; }
+  /// Where the last word of a text begins.
+  const char* last_word() const { return last_word_; }
   std::size_t size() const { return bytes_.size(); }
   /// Those that follow after so many bytes.
   PlyValues after(std::size_t bytes) const { return {bytes_.substr(bytes), encoding_}; }
@@ -103,6 +116,7 @@ class PlyValues {
     bytes_.remove_prefix(std::min(bytes_.find_first_not_of(kBlanks), bytes_.size()));
     if (bytes_.empty()) throw InputError("it is truncated");
     const std::string_view word = bytes_.substr(0, bytes_.find_first_of(kBlanks));
+    last_word_ = word.data();
     bytes_.remove_prefix(word.size());
     if (const auto number = parse_number(word)) return *number;
     throw InputError(fmt::format("'{}' is not a finite number", word.substr(0, 40)));
@@ -110,6 +124,7 @@ class PlyValues {
 
   std::string_view bytes_;
   PlyEncoding encoding_;
+  const char* last_word_ = nullptr;
 };
 
 /// Where a property of a vertex belongs: x, y, z, nx, ny, nz, u, v, red, green, blue.
@@ -152,6 +167,9 @@ class PlyReader {
  public:
   PlyReader(const PlyHeader& header, PlyValues values) : header_(header), values_(values) {}
 
+  /// Where the last word of a text begins that was read; none if none was, or of a binary file.
+  const char* last_word() const { return values_.last_word(); }
+
   PlyFile read() {
     for (const PlyElement& element : header_.elements) {
       values_.expect(element);
@@ -162,9 +180,13 @@ class PlyReader {
       else
         skip(element);
     }
+    is_read_ = true;
     check_mesh(file_.mesh);
     return std::move(file_);
   }
+
+  /// True if nothing is wrong with a line of a text, but perhaps with the whole.
+  bool is_read() const { return is_read_; }
 
  private:
   void read_vertices(const PlyElement& element) {
@@ -196,7 +218,7 @@ class PlyReader {
       std::array<float, kSlotCount> row{};
       for (std::size_t k = 0; k < slots.size(); ++k) {
         if (slots[k])
-          row.at(*slots[k]) = static_cast<float>(values.next(element.properties[k].type));
+          row.at(*slots[k]) = values.next_float(element.properties[k].type);
         else
           skip(element.properties[k], values);
       }
@@ -279,13 +301,23 @@ class PlyReader {
   void read_polygon(const PlyProperty& property) {
     const std::size_t count = values_.next_count(*property.count_type);
     if (count < 3) throw InputError("a face has fewer than three corners");
-    const std::uint32_t first = read_index(property.type, values_);
-    std::uint32_t last = read_index(property.type, values_);
+    const std::uint32_t first = read_corner(property.type);
+    std::uint32_t last = read_corner(property.type);
     for (std::size_t i = 2; i < count; ++i) {
-      const std::uint32_t next = read_index(property.type, values_);
+      const std::uint32_t next = read_corner(property.type);
       file_.mesh.triangles.push_back({first, last, next});
       last = next;
     }
+  }
+
+  /// The index of a vertex, which of a text must be there, as long as its line is known.
+  std::uint32_t read_corner(PlyType type) {
+    const std::uint32_t index = read_index(type, values_);
+    const std::size_t vertices = file_.mesh.positions.size();
+    if (values_.is_text() && vertices > 0 && index >= vertices)
+      throw InputError(
+          fmt::format("a face refers to vertex {}, but there are only {}", index, vertices));
+    return index;
   }
 
   static std::uint32_t read_index(PlyType type, PlyValues& values) {
@@ -312,6 +344,7 @@ class PlyReader {
   const PlyHeader& header_;
   PlyValues values_;
   PlyFile file_;
+  bool is_read_ = false;
 };
 
 std::string read_ply_bytes(const std::filesystem::path& file) {
@@ -326,13 +359,27 @@ std::string read_ply_bytes(const std::filesystem::path& file) {
 }  // namespace
 
 PlyFile read_ply(const std::filesystem::path& file) {
+  const auto unusable = [&](const InputError& error) {
+    return InputError("the mesh '" + file.string() + "' is not usable: " + error.what());
+  };
+  std::string bytes;
+  PlyHeader header;
   try {
-    const std::string bytes = read_ply_bytes(file);
-    const PlyHeader header = read_ply_header(bytes);
-    const std::string_view body = std::string_view(bytes).substr(header.size);
-    return PlyReader(header, PlyValues(body, header.encoding)).read();
+    bytes = read_ply_bytes(file);
+    header = read_ply_header(bytes);
+  } catch (const LineError& error) {
+    throw InputError(problem_in_line(file, bytes, error.line(), error.what()));
   } catch (const InputError& error) {
-    throw InputError("the mesh '" + file.string() + "' is not usable: " + error.what());
+    throw unusable(error);
+  }
+  const std::string_view body = std::string_view(bytes).substr(header.size);
+  PlyReader reader(header, PlyValues(body, header.encoding));
+  try {
+    return reader.read();
+  } catch (const InputError& error) {
+    if (reader.last_word() == nullptr || reader.is_read()) throw unusable(error);
+    const auto offset = static_cast<std::size_t>(reader.last_word() - bytes.data());
+    throw InputError(problem_in_line(file, bytes, location_in(bytes, offset).line, error.what()));
   }
 }
 

@@ -19,7 +19,8 @@ struct PlyFile : ColoredMesh {
 /// Reads positions, and where the file has them normals (nx, ny, nz), texture coordinates (u, v or
 /// s, t or texture_u, texture_v) and colours (red, green, blue, or with diffuse_ before them, or r,
 /// g, b) of the vertices; polygons become fans of triangles. Text and
-/// binary files of both byte orders. Throws InputError.
+/// binary files of both byte orders. Throws InputError that names the line, if it is one that is
+/// wrong.
 PlyFile read_ply(const std::filesystem::path& file);
 
 }  // namespace driftlight

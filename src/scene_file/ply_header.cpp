@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "driftlight/error.h"
+#include "excerpt.h"
+#include "nearest_names.h"
 #include "text.h"
 
 namespace driftlight {
@@ -68,7 +70,7 @@ class PlyHeaderReader {
       if (known == name) return entry;
       names.emplace_back(known);
     }
-    fail(fmt::format("has the unknown word '{}'; valid are: {}", name, join(names)));
+    fail(fmt::format("has the unknown word '{}'; {}", name, hint(name, names)));
   }
 
   /// The words of the next line, which must have an end.
@@ -114,7 +116,7 @@ class PlyHeaderReader {
   }
 
   [[noreturn]] void fail(const std::string& message) const {
-    throw InputError(fmt::format("line {} of its header {}", line_, message));
+    throw LineError(line_, "this line of the header " + message);
   }
 
   std::string_view bytes_;

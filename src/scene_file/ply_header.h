@@ -37,7 +37,7 @@ struct PlyHeader {
   std::size_t size = 0;  ///< bytes, with the end of its last line
 };
 
-/// The header at the beginning of `bytes`. Throws InputError naming the line that is wrong.
+/// The header at the beginning of `bytes`. Throws LineError if a line is wrong, else InputError.
 PlyHeader read_ply_header(std::string_view bytes);
 
 }  // namespace driftlight

@@ -8,20 +8,25 @@
 #include <set>
 
 #include "color_xml.h"
+#include "included_files.h"
 #include "text.h"
 #include "transform_xml.h"
+#include "unsupported.h"
 
 namespace driftlight {
 
 Properties::Properties(const Element& element)
     : element_(element), type_(lower_case(element.find("type").value_or(""))) {
-  element.allow_attributes({"type", "id", "name"});
+  if (element.is_outermost())
+    element.allow_attributes({"version", "type", "id", "name"});
+  else
+    element.allow_attributes({"type", "id", "name"});
   std::set<std::string> seen;
-  for (const Element& child : element.children()) {
-    const std::string name = snake_case(child.find("name").value_or(""));
+  for (const Content& content : contents_of(element)) {
+    const std::string name = snake_case(content.name);
     if (!name.empty() && !seen.insert(name).second)
-      child.fail(fmt::format("'{}' is given twice in {}", child.text("name"), description()));
-    children_.push_back({child, name});
+      content.element.fail(fmt::format("'{}' is given twice in {}", content.name, description()));
+    children_.push_back({content.element, name});
   }
 }
 
@@ -45,8 +50,8 @@ std::optional<Element> Properties::find(std::string_view name,
                                         const std::vector<std::string>& tags) {
   const std::optional<Element> child = find(name);
   if (child && std::find(tags.begin(), tags.end(), child->tag()) == tags.end())
-    child->fail(fmt::format("'{}' of {} must be <{}>, not <{}>", child->text("name"), description(),
-                            tags.front(), child->tag()));
+    child->fail(fmt::format("'{}' of {} must be <{}>, not <{}>", spelling(name, dialect()),
+                            description(), tags.front(), child->tag()));
   return child;
 }
 
@@ -63,6 +68,16 @@ std::vector<Element> Properties::nested(std::initializer_list<std::string_view> 
 
 void Properties::ignore(std::initializer_list<std::string_view> names) {
   for (const std::string_view name : names) find(name);
+}
+
+std::vector<std::string> Properties::ignore_if(bool (*fits)(const std::string& name)) {
+  std::vector<std::string> result;
+  for (Child& child : children_) {
+    if (child.used || child.name.empty() || !fits(child.name)) continue;
+    child.used = true;
+    result.push_back(child.element.find("name").value_or(child.name));
+  }
+  return result;
 }
 
 double Properties::number(std::string_view name, double fallback) {
@@ -98,8 +113,9 @@ bool Properties::boolean(std::string_view name, bool fallback) {
   if (!child) return fallback;
   child->allow_attributes({"name", "value"});
   const std::string value = child->text("value");
-  if (value != "true" && value != "false") child->fail("'" + value + "' is not true or false");
-  return value == "true";
+  const std::string lower = dialect() == Dialect::Mitsuba3 ? lower_case(value) : value;
+  if (lower != "true" && lower != "false") child->fail("'" + value + "' is not true or false");
+  return lower == "true";
 }
 
 std::optional<std::string> Properties::text(std::string_view name) {
@@ -111,14 +127,19 @@ std::optional<std::string> Properties::text(std::string_view name) {
 
 std::string Properties::required_text(std::string_view name) {
   if (auto value = text(name)) return *std::move(value);
-  element_.fail(description() + " lacks the <string> '" + spelling(name, dialect()) + "'");
+  std::string message =
+      fmt::format("{} lacks the <string> '{}'", description(), spelling(name, dialect()));
+  for (const Element& other : unused())
+    if (other.find("name") && is_slip(other.text("name"), name))
+      message += fmt::format("; is it meant by '{}'?", other.text("name"));
+  element_.fail(message);
 }
 
 std::string Properties::choice(std::string_view name, const std::string& fallback,
                                const std::vector<std::string>& valid) {
   const std::string value = lower_case(text(name).value_or(fallback));
   if (std::find(valid.begin(), valid.end(), value) == valid.end())
-    fail(name, "'" + value + "' is not supported; valid are: " + join(valid));
+    fail(name, "'" + value + "' is not supported; " + hint(value, valid));
   return value;
 }
 
@@ -136,7 +157,10 @@ std::optional<Vec3d> Properties::vector(std::string_view name) {
 }
 
 std::optional<Vec3d> Properties::coordinates(std::string_view name, const std::string& tag) {
-  const auto child = find(name, {tag});
+  // To Mitsuba 3 points and vectors are the same.
+  std::vector<std::string> tags{tag};
+  if (dialect() == Dialect::Mitsuba3) tags.emplace_back(tag == "point" ? "vector" : "point");
+  const auto child = find(name, tags);
   if (!child) return std::nullopt;
   if (dialect() == Dialect::Mitsuba3)
     child->allow_attributes({"name", "x", "y", "z", "value"});
@@ -151,14 +175,30 @@ Eigen::Affine3d Properties::transform(std::string_view name) {
   return child ? read_transform(*child) : Eigen::Affine3d::Identity();
 }
 
+std::vector<Element> Properties::unused() const {
+  std::vector<Element> result;
+  for (const Child& child : children_)
+    if (!child.used) result.push_back(child.element);
+  return result;
+}
+
 void Properties::finish() const {
-  for (const Child& child : children_) {
-    if (child.used) continue;
-    if (child.name.empty())
-      child.element.fail("<" + child.element.tag() + "> is not supported in " + description());
-    child.element.fail(fmt::format("unknown property '{}' of {}; valid are: {}",
-                                   child.element.text("name"), description(),
-                                   names_.empty() ? "none" : join(names_)));
+  for (const Element& child : unused()) {
+    const std::vector<std::string> tags = known_tags();
+    const std::string tag = child.tag();
+    const std::string name = child.find("name").value_or("");
+    if (is_part_of_picture(tag) || is_unsupported_property(element_.tag(), type_, snake_case(name)))
+      child.fail(fmt::format("{} is not supported in {}",
+                             name.empty() ? fmt::format("<{}>", tag) : fmt::format("'{}'", name),
+                             description()));
+    if (std::find(tags.begin(), tags.end(), tag) == tags.end())
+      child.fail(
+          fmt::format("unknown element <{}> in {}; {}", tag, description(), hint(tag, tags)));
+    if (name.empty())
+      child.unused(fmt::format("<{}> is not used in {}", tag, description()));
+    else
+      child.unused(fmt::format("unknown property '{}' of {} is not used; {}", name, description(),
+                               hint(name, names_)));
   }
 }
 

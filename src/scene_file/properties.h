@@ -10,14 +10,15 @@
 #include <vector>
 
 #include "driftlight/scalar.h"
+#include "nearest_names.h"
 #include "text.h"
 #include "xml_document.h"
 
 namespace driftlight {
 
 /// The children of an element such as <bsdf type="diffuse">, each to be asked for by its reader.
-/// What nobody asked for is an error in `finish`, which names all that was asked for. Readers ask
-/// in camel case ("toWorld"); files of either dialect may also write "to_world".
+/// What nobody asked for is named by `finish`. Readers ask in camel case ("toWorld"); files of
+/// either dialect may also write "to_world".
 class Properties {
  public:
   /// Throws SceneError if two children have the same name.
@@ -37,6 +38,9 @@ class Properties {
   std::vector<Element> nested(std::initializer_list<std::string_view> tags);
   /// Allows properties that have no bearing on the picture.
   void ignore(std::initializer_list<std::string_view> names);
+  /// Allows those whose name, in snake case, fits and that nobody has asked for; their names as
+  /// written.
+  std::vector<std::string> ignore_if(bool (*fits)(const std::string& name));
 
   double number(std::string_view name, double fallback);
   double positive(std::string_view name, double fallback);
@@ -44,7 +48,7 @@ class Properties {
   int integer(std::string_view name, int fallback);
   bool boolean(std::string_view name, bool fallback);
   std::optional<std::string> text(std::string_view name);
-  /// The same, and throws SceneError if it is missing.
+  /// The same, and throws SceneError if it is missing, naming what may be meant by it.
   std::string required_text(std::string_view name);
   /// A text out of a few, in lower case.
   std::string choice(std::string_view name, const std::string& fallback,
@@ -55,7 +59,11 @@ class Properties {
   /// Identity if there is none.
   Eigen::Affine3d transform(std::string_view name);
 
-  /// Throws SceneError on the first child that was not asked for.
+  /// The children that were not asked for.
+  std::vector<Element> unused() const;
+
+  /// Says of each child that was not asked for that it is not used, with the names nearest to its
+  /// own of all that were. Throws SceneError if Mitsuba would use it and the picture would change.
   void finish() const;
 
   /// Throws SceneError about a property that `find` has found, or about the plugin.
@@ -79,7 +87,7 @@ class Properties {
 };
 
 /// The entry of a table of plugins, (name, what to do) pairs, for the type of this one. Throws
-/// SceneError naming the valid types.
+/// SceneError naming valid types.
 template <class Table>
 auto find_plugin(const Table& table, const Properties& properties) {
   std::vector<std::string> names;
@@ -88,7 +96,7 @@ auto find_plugin(const Table& table, const Properties& properties) {
     names.emplace_back(name);
   }
   const Element& element = properties.element();
-  element.fail("unknown " + properties.description() + "; valid are: " + join(names));
+  element.fail("unknown " + properties.description() + "; " + hint(properties.type(), names));
 }
 
 }  // namespace driftlight

@@ -24,7 +24,7 @@ constexpr std::array<std::pair<std::string_view, double>, 23> kDielectrics{{
     {"pet", 1.575},       {"diamond", 2.419},
 }};
 
-/// An entry by name in lower case, or a SceneError naming them all.
+/// An entry by name in lower case, or a SceneError naming the nearest ones.
 template <class Table>
 auto& find_substance(Properties& properties, std::string_view property, const std::string& name,
                      const Table& table) {
@@ -33,7 +33,7 @@ auto& find_substance(Properties& properties, std::string_view property, const st
     if (lower_case(entry.first) == lower_case(name)) return entry.second;
     names.emplace_back(entry.first);
   }
-  properties.fail(property, "'" + name + "' is not known; valid are: " + join(names));
+  properties.fail(property, "'" + name + "' is not known; " + hint(name, names));
 }
 
 Rgbd to_rgb(std::span<const MetalSample> samples, double MetalSample::*part) {

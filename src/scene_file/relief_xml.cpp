@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "relief_xml.h"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "bsdfs_xml.h"
@@ -36,6 +38,14 @@ Surface read_relief(Properties& properties, LoadContext& context, Relief relief)
     properties.element().fail(properties.description() + " needs a texture and a nested bsdf");
   if (nested->relief)
     properties.element().fail("bump and normal maps cannot be nested in each other");
+  if (context.assumed_srgb.contains(texture->bitmap))
+    context.notice(
+        properties.element(),
+        fmt::format("the image of {} is decoded as sRGB, as nothing else is asked for; {} "
+                    "takes its values as they are, which most such images want",
+                    properties.description(),
+                    properties.dialect() == Dialect::Mitsuba3 ? "the boolean 'raw' as true"
+                                                              : "the float 'gamma' as 1"));
   if (is_vertex_colors(*texture))
     properties.element().fail("vertex colours cannot be a bump or normal map");
   relief.texture = *texture;
@@ -45,21 +55,34 @@ Surface read_relief(Properties& properties, LoadContext& context, Relief relief)
   return result;
 }
 
+/// What Mitsuba 3 does unless it is told otherwise, Mitsuba 0.6 never, and we do not.
+void note_invalid_normals(Properties& properties, LoadContext& context) {
+  const bool newer = properties.dialect() == Dialect::Mitsuba3;
+  const bool flips = properties.boolean("flipInvalidNormals", newer);
+  const bool shadows = properties.boolean("useShadowingFunction", newer);
+  const auto name = [&](std::string_view camel) { return spelling(camel, properties.dialect()); };
+  if (flips)
+    context.notice(properties.element(),
+                   fmt::format("{} is black where its normals face away from the viewer: '{}' is "
+                               "not supported",
+                               properties.description(), name("flipInvalidNormals")));
+  if (shadows)
+    context.notice(properties.element(),
+                   fmt::format("grazing light on the slopes of {} is not dimmed: '{}' is not "
+                               "supported",
+                               properties.description(), name("useShadowingFunction")));
+}
+
 }  // namespace
 
 Surface read_bump_map(Properties& properties, LoadContext& context) {
   const double scale = properties.number("scale", 1.0);
+  note_invalid_normals(properties, context);
   return read_relief(properties, context, {Relief::Kind::Bumps, {}, scale});
 }
 
 Surface read_normal_map(Properties& properties, LoadContext& context) {
-  // Of newer versions of Mitsuba 3.
-  const bool flips = properties.boolean("flipInvalidNormals", false);
-  const bool shadows = properties.boolean("useShadowingFunction", false);
-  if (flips || shadows)
-    context.notice(
-        properties.element(),
-        "normals that face away from the viewer are black, neither flipped nor shadowed");
+  note_invalid_normals(properties, context);
   return read_relief(properties, context, {Relief::Kind::Normals, {}, 1.0});
 }
 

@@ -66,11 +66,13 @@ ReconstructionFilter read_lanczos(Properties& filter) {
   return {Kind::Lanczos, checked_radius(filter, "lobes", filter.integer("lobes", 3))};
 }
 
-/// Mitsuba's default is the Gaussian.
+/// That of films that have none, as in Mitsuba.
+ReconstructionFilter default_filter() { return {Kind::Gaussian, 2.0}; }
+
 ReconstructionFilter read_filter(Properties& film) {
   const std::vector<Element> filters = film.nested({"rfilter"});
   if (filters.size() > 1) filters.back().fail("a second rfilter of the film");
-  if (filters.empty()) return {Kind::Gaussian, 2.0};
+  if (filters.empty()) return default_filter();
   Properties filter(filters[0]);
   using Reader = ReconstructionFilter (*)(Properties&);
   constexpr std::array<std::pair<std::string_view, Reader>, 6> kFilters{
@@ -126,6 +128,31 @@ ToneMapping read_tone_mapping(Properties& film) {
   return tones;
 }
 
+/// Images have colours and nothing else, whatever the film asks for.
+void note_pixel_format(Properties& film, LoadContext& context) {
+  const std::string format = film.text("pixelFormat").value_or("rgb");
+  if (lower_case(format) == "rgb") return;
+  context.notice(
+      *film.find("pixelFormat"),
+      fmt::format("{} '{}' is not used: images have the channels R, G and B, and no alpha",
+                  spelling("pixelFormat", film.dialect()), format));
+}
+
+/// True for what Mitsuba 0.6 writes into or beside the image: "label[10, 10]",
+/// "metadata['author']".
+bool is_annotation(const std::string& name) {
+  std::string text;
+  for (const std::string& part : split(lower_case(name), " \t\r\n")) text += part;
+  return (text.starts_with("label[") && text.ends_with("]")) ||
+         (text.starts_with("metadata['") && text.ends_with("']"));
+}
+
+void note_annotations(Properties& film, LoadContext& context) {
+  const std::vector<std::string> names = film.ignore_if(&is_annotation);
+  if (!names.empty())
+    context.notice(film.element(), "annotations of the film are not written: " + join(names));
+}
+
 FilmSize read_film(const Element& element, LoadContext& context) {
   Properties film(element);
   const std::array<std::pair<std::string_view, bool>, 2> kinds{
@@ -134,17 +161,24 @@ FilmSize read_film(const Element& element, LoadContext& context) {
   FilmSize size = read_size(film);
   read_crop(film, size);
   size.filter = read_filter(film);
-  film.ignore({"fileFormat", "pixelFormat", "componentFormat", "channelNames", "banner",
-               "attachLog", "highQualityEdges", "filename", "sampleBorder", "compensate"});
+  note_pixel_format(film, context);
+  if (film.dialect() == Dialect::Mitsuba06) note_annotations(film, context);
+  film.ignore({"fileFormat", "componentFormat", "channelNames", "banner", "attachLog",
+               "highQualityEdges", "filename", "sampleBorder", "compensate"});
   if (tone_mapped) context.tone_mapping = read_tone_mapping(film);
   film.finish();
   return size;
 }
 
+/// A sensor without a film has an hdrfilm with all defaults, as in Mitsuba.
 FilmSize read_film_of(Properties& sensor, LoadContext& context) {
   const std::vector<Element> films = sensor.nested({"film"});
-  if (films.size() != 1) sensor.element().fail("the sensor needs one <film>");
-  return read_film(films[0], context);
+  if (films.size() > 1) films.back().fail("a second film of the sensor");
+  if (!films.empty()) return read_film(films[0], context);
+  FilmSize size;
+  size.filter = default_filter();
+  size.crop = {0, 0, size.width, size.height};
+  return size;
 }
 
 /// tan(fov_x / 2) from a full angle across the diagonal (degrees).
@@ -215,13 +249,18 @@ void shift(Camera& camera, Properties& sensor) {
   camera.center.y() = -2.0 * camera.half_height * sensor.number("principalPointOffsetY", 0.0);
 }
 
-/// How many samples a pixel gets is up to the command line; says which number the scene asks for.
-void note_sampler(const Element& element, LoadContext& context) {
+/// How many samples a pixel gets is up to the command line, unless it does not say. Numbers are
+/// drawn by the integrators.
+void read_sampler(const Element& element, LoadContext& context) {
   Properties sampler(element);
-  const int count = sampler.integer("sampleCount", 4);
-  context.notice(element, fmt::format("{} is not used; its {} is --spp {} on the command line",
-                                      sampler.description(),
-                                      spelling("sampleCount", element.dialect()), count));
+  if (sampler.has("sampleCount")) {
+    context.sample_count = sampler.integer("sampleCount", 4);
+    if (*context.sample_count < 1) sampler.fail("sampleCount", "must be positive");
+  }
+  sampler.ignore({"seed", "scramble", "dimension", "jitter"});
+  sampler.finish();
+  if (sampler.type() != "independent")
+    context.notice(element, sampler.description() + " is not used: samples are independent");
 }
 
 void read_clips(Camera& camera, Properties& sensor) {
@@ -291,7 +330,7 @@ Camera read_sensor(const Element& element, LoadContext& context) {
   crop(camera, film);
   // The others have no focus, and nothing here moves.
   properties.ignore({"focusDistance", "shutterOpen", "shutterClose"});
-  for (const Element& sampler : properties.nested({"sampler"})) note_sampler(sampler, context);
+  for (const Element& sampler : properties.nested({"sampler"})) read_sampler(sampler, context);
   properties.finish();
   context.objects.define(element, NamedObjects::Other{});
   return camera;

@@ -38,7 +38,13 @@ constexpr std::array<std::pair<std::string_view, ShapeReader>, 10> kShapes{{
 
 Attachments read_attachments(Properties& properties, LoadContext& context) {
   Attachments result;
-  for (const Element& element : properties.nested({"bsdf", "ref"})) {
+  for (const Element& element : properties.nested({"bsdf", "ref", "emitter"})) {
+    if (is_area_emitter(element, context)) {
+      if (result.radiance) element.fail("a second emitter of the shape");
+      result.radiance = read_area_radiance(element, context);
+      context.has_emitter = true;
+      continue;
+    }
     const std::string material = element.find("name").value_or("");
     if (properties.type() == "obj" && !material.empty() &&
         element.dialect() == Dialect::Mitsuba06) {
@@ -47,10 +53,6 @@ Attachments read_attachments(Properties& properties, LoadContext& context) {
     }
     if (result.surface) element.fail("a second bsdf of the shape");
     result.surface = read_surface(element, context);
-  }
-  for (const Element& element : properties.nested({"emitter"})) {
-    if (result.radiance) element.fail("a second emitter of the shape");
-    result.radiance = read_area_radiance(element, context);
   }
   return result;
 }

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "bsdfs_xml.h"
-#include "driftlight/frame.h"
+#include "direction_across.h"
 #include "shape_readers.h"
 #include "transform_geometry.h"
 
@@ -30,15 +30,6 @@ void append_quad(TriangleMesh& mesh, const Quad& quad, const Eigen::Affine3d& to
   mesh.triangles.push_back({first + 2, last, first});
 }
 
-/// Where Mitsuba begins to count the angle around an axis.
-Vec3d first_direction(const Vec3d& axis, Dialect dialect) {
-  if (dialect == Dialect::Mitsuba3) return tangent_basis(axis).t;
-  const bool leans_to_x = std::abs(axis.x()) > std::abs(axis.y());
-  const Vec3d across =
-      leans_to_x ? Vec3d(axis.z(), 0.0, -axis.x()) : Vec3d(0.0, axis.z(), -axis.y());
-  return across.normalized().cross(axis);
-}
-
 }  // namespace
 
 std::vector<ShapePart> read_rectangle(Properties& properties, LoadContext&, const Attachments&) {
@@ -47,6 +38,8 @@ std::vector<ShapePart> read_rectangle(Properties& properties, LoadContext&, cons
   TriangleMesh mesh;
   append_quad(mesh, quad, properties.transform("toWorld"),
               properties.boolean("flipNormals", false));
+  // In Mitsuba 3 it is a mesh.
+  if (properties.dialect() == Dialect::Mitsuba3) properties.ignore({"faceNormals"});
   return {{mesh}};
 }
 
@@ -61,7 +54,12 @@ std::vector<ShapePart> read_cube(Properties& properties, LoadContext&, const Att
       {Vec3d(1, 1, -1), Vec3d(1, -1, -1), Vec3d(-1, -1, -1), Vec3d(-1, 1, -1)},
   }};
   const Eigen::Affine3d to_world = properties.transform("toWorld");
-  const bool flip = properties.boolean("flipNormals", false);
+  // Its normals are those of its faces anyway. Without them nothing keeps a mirrored cube of
+  // Mitsuba 0.6 from turning inside out.
+  const bool face_normals = properties.boolean("faceNormals", false);
+  const bool turns = face_normals && properties.dialect() != Dialect::Mitsuba3 &&
+                     to_world.linear().determinant() < 0.0;
+  const bool flip = properties.boolean("flipNormals", false) != turns;
   TriangleMesh mesh;
   for (const auto& corners : faces) append_quad(mesh, {corners, uvs}, to_world, flip);
   return {{mesh}};
@@ -102,7 +100,8 @@ std::vector<ShapePart> read_cylinder(Properties& properties, LoadContext&, const
   const Vec3d p1 = properties.point("p1").value_or(Vec3d(0, 0, 1));
   if (!((p1 - p0).norm() > 0.0)) properties.fail("p1", "must not be 'p0'");
   const Vec3d axis = (p1 - p0).normalized();
-  const Vec3d x = first_direction(axis, properties.dialect());
+  // Where Mitsuba begins to count the angle.
+  const Vec3d x = direction_across(axis, properties.dialect());
   Cylinder cylinder;
   cylinder.base = p0;
   cylinder.length = (p1 - p0).norm();

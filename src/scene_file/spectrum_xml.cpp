@@ -3,9 +3,12 @@
 
 #include <array>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 
 #include "color_values.h"
 #include "color_xml.h"
+#include "excerpt.h"
 #include "properties.h"
 #include "spectrum.h"
 #include "text.h"
@@ -61,14 +64,16 @@ Rgbd read_spectrum_file(const Element& element) {
   std::ifstream stream(file);
   if (!stream || std::filesystem::is_directory(file))
     element.fail("the spectrum '" + file.string() + "' cannot be opened");
+  const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  std::istringstream lines(text);
   SpectrumReader reader(element);
   std::string line;
-  for (int number = 1; std::getline(stream, line); ++number) {
+  for (int number = 1; std::getline(lines, line); ++number) {
     const std::vector<std::string> parts = split_list(line.substr(0, line.find('#')));
     if (parts.empty()) continue;
-    if (parts.size() != 2)
-      element.fail("line " + std::to_string(number) + " of '" + file.string() +
-                   "' is not of the form \"wavelength value\"");
+    if (parts.size() != 2 || !parse_number(parts[0]) || !parse_number(parts[1]))
+      element.fail(
+          problem_in_line(file, text, number, "this is not of the form \"wavelength value\""));
     reader.add(parts[0], parts[1]);
   }
   return reader.color();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "substitutions.h"
 
-#include "text.h"
+#include "nearest_names.h"
 
 namespace driftlight {
 namespace {
@@ -35,6 +35,7 @@ Substitutions::Substitutions(std::map<std::string, std::string> defines)
 
 void Substitutions::add_default(const std::string& name, const std::string& value) {
   values_.try_emplace(name, value);
+  declared_.insert(name);
   unused_defines_.erase(name);
 }
 
@@ -47,20 +48,24 @@ const std::string* Substitutions::longest_name(std::string_view text) const {
   return best;
 }
 
-std::string Substitutions::apply(const std::string& text) {
+std::string Substitutions::apply(const std::string& text, Dialect dialect) {
+  const bool keeps_names = dialect == Dialect::Mitsuba06 && text.find('[') != std::string::npos;
   std::string result;
   std::size_t done = 0;
-  for (auto dollar = text.find('$'); dollar != std::string::npos; dollar = text.find('$', done)) {
+  std::size_t next = 0;
+  for (auto dollar = text.find('$'); dollar != std::string::npos; dollar = text.find('$', next)) {
     const std::string_view rest = std::string_view(text).substr(dollar + 1);
     const std::string* const name = longest_name(rest);
+    next = dollar + 1;
+    if (!name && keeps_names) continue;
     if (!name)
       throw InputError("'$" + std::string(leading_identifier(rest)) +
-                       "' has no value; give it one with <default> or on the command line "
-                       "(defined are: " +
-                       (values_.empty() ? "none" : join(keys(values_))) + ")");
+                       "' has no value; give it one with <default> or on the command line; " +
+                       hint(leading_identifier(rest), keys(values_)));
     result.append(text, done, dollar - done).append(values_.at(*name));
     unused_defines_.erase(*name);
-    done = dollar + 1 + name->size();
+    declared_.insert(*name);
+    next = done = dollar + 1 + name->size();
     if (result.size() > kMaximumLength)
       throw InputError("with its $names replaced, the text is longer than " +
                        std::to_string(kMaximumLength) + " characters");
@@ -69,10 +74,12 @@ std::string Substitutions::apply(const std::string& text) {
 }
 
 void Substitutions::check_defines_used(const std::filesystem::path& file) const {
-  if (unused_defines_.empty()) return;
-  throw SceneError({file.string()}, "the definition of '" + *unused_defines_.begin() +
-                                        "' is not used: the scene has no $" +
-                                        *unused_defines_.begin());
+  std::string message;
+  for (const std::string& name : unused_defines_)
+    message += (message.empty() ? "" : "; ") + ("the definition of '" + name) +
+               "' is not used: the scene has no $" + name + "; " +
+               hint(name, {declared_.begin(), declared_.end()});
+  if (!message.empty()) throw SceneError({file.string()}, message);
 }
 
 }  // namespace driftlight

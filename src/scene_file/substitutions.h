@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "dialect.h"
 #include "driftlight/error.h"
 
 namespace driftlight {
@@ -22,10 +23,12 @@ class Substitutions {
   void add_default(const std::string& name, const std::string& value);
 
   /// The text with every $name replaced by the value of the longest name that fits there, as
-  /// Mitsuba does. Throws InputError on a name without a value, or if the text grows too long.
-  std::string apply(const std::string& text);
+  /// Mitsuba does. Throws InputError on a name without a value, or if the text grows too long. In
+  /// the older dialect a text with a '[' may be an annotation of a film, which has names of its
+  /// own: there those without a value stay.
+  std::string apply(const std::string& text, Dialect dialect);
 
-  /// Throws SceneError if the user defined a name that `file` neither uses nor declares.
+  /// Throws SceneError naming all that the user defined and that `file` neither uses nor declares.
   void check_defines_used(const std::filesystem::path& file) const;
 
  private:
@@ -33,6 +36,7 @@ class Substitutions {
 
   std::map<std::string, std::string> values_;
   std::set<std::string> unused_defines_;
+  std::set<std::string> declared_;  ///< names that the scene uses or has a <default> for
 };
 
 }  // namespace driftlight

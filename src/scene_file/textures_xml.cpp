@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "textures_xml.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <array>
 #include <string>
+#include <utility>
 
 #include "color_xml.h"
 #include "vertex_colors.h"
@@ -48,9 +52,11 @@ Texture read_bitmap_texture(Properties& properties, LoadContext& context) {
   const std::string file = properties.required_text("filename");
   std::optional<Gamma> gamma = read_gamma(properties);
   if (properties.boolean("raw", false)) gamma = 1.0;
-  texture.bitmap = with_location(properties.element(), [&] {
-    return std::make_shared<const Bitmap>(read_bitmap(properties.element().find_file(file), gamma));
+  ImageFile image = with_location(properties.element(), [&] {
+    return read_image_file(properties.element().find_file(file), gamma);
   });
+  texture.bitmap = std::make_shared<const Bitmap>(std::move(image.bitmap));
+  if (!gamma && !image.gamma) context.assumed_srgb.insert(texture.bitmap);
   read_mapping(properties, texture);
   read_filter_type(properties, texture, context);
   const std::string both = properties.text("wrapMode").value_or("repeat");
@@ -149,6 +155,47 @@ Texture read_textured(Properties& properties, std::string_view name, const Rgbd&
   if (child && (child->tag() == "texture" || child->tag() == "ref"))
     return read_texture(*child, context);
   return Texture(properties.color(name, fallback));
+}
+
+Texture read_scalar(Properties& properties, std::string_view name, double fallback,
+                    LoadContext& context) {
+  const std::optional<Element> child = properties.find(name);
+  if (child && child->tag() == "float")
+    return Texture(Rgbd::Constant(properties.non_negative(name, fallback)));
+  return read_textured(properties, name, Rgbd::Constant(fallback), context);
+}
+
+Texture read_share(Properties& properties, std::string_view name, double fallback,
+                   LoadContext& context) {
+  Texture texture = read_scalar(properties, name, fallback, context);
+  if (is_vertex_colors(texture))
+    properties.fail(name, "must be one number, which vertex colours are not");
+  const bool newer = properties.dialect() == Dialect::Mitsuba3;
+  const Rgbd factors = newer ? kLuminance : Rgbd::Constant(1.0 / 3.0);
+  double largest = 0;
+  const auto gray = [&](const Rgbd& color) {
+    const double share = (factors * color).sum();
+    largest = std::max(largest, share);
+    return Rgbd(Rgbd::Constant(std::min(share, 1.0)));
+  };
+  if (texture.is_constant()) texture.color = gray(texture.color);
+  if (texture.pattern) {
+    texture.pattern->color0 = gray(texture.scale * texture.pattern->color0);
+    texture.pattern->color1 = gray(texture.scale * texture.pattern->color1);
+  }
+  if (texture.bitmap != nullptr) {
+    Bitmap bitmap = *texture.bitmap;
+    for (Eigen::Array3f& texel : bitmap.texels)
+      texel = gray(texture.scale * texel.cast<double>()).cast<float>();
+    texture.bitmap = std::make_shared<const Bitmap>(std::move(bitmap));
+  }
+  texture.scale = kWhite;
+  constexpr double kRounding = 1e-6;
+  if (largest > 1.0 + kRounding)
+    context.notice(properties.element(),
+                   fmt::format("'{}' of {} exceeds 1 and is taken as 1 there, as in Mitsuba",
+                               spelling(name, properties.dialect()), properties.description()));
+  return texture;
 }
 
 void scale(Texture& texture, const Rgbd& factor) {

@@ -5,7 +5,10 @@
 #include <array>
 #include <cmath>
 
+#include "direction_across.h"
 #include "driftlight/scalar.h"
+#include "nearest_names.h"
+#include "text.h"
 
 namespace driftlight {
 namespace {
@@ -55,13 +58,17 @@ Eigen::Affine3d read_scale(const Element& element) {
   return Eigen::Affine3d(Eigen::Scaling(factors));
 }
 
-/// A camera at `origin` that looks along its +z to `target`; +x is its left.
+/// A camera at `origin` that looks along its +z to `target`; +x is its left. Without an `up`, or
+/// with one of zero, it is turned as Mitsuba turns it.
 Eigen::Affine3d read_look_at(const Element& element) {
   element.allow_attributes({"origin", "target", "up"});
   const Vec3d origin = read_vector(element, "origin");
   const Vec3d forward = read_vector(element, "target") - origin;
   if (!(forward.norm() > 0.0)) element.fail("<lookat>: 'origin' and 'target' coincide");
-  const Vec3d left = read_vector(element, "up").cross(forward);
+  const bool has_up = !split_list(element.find("up").value_or("")).empty();
+  Vec3d up = has_up ? read_vector(element, "up") : Vec3d(0, 0, 0);
+  if (up.isZero(0.0)) up = direction_across(forward.normalized(), element.dialect());
+  const Vec3d left = up.cross(forward);
   if (!(left.norm() > 1e-12 * forward.norm()))
     element.fail("<lookat>: 'up' must not be parallel to the direction from 'origin' to 'target'");
   Eigen::Affine3d result = Eigen::Affine3d::Identity();
@@ -72,8 +79,15 @@ Eigen::Affine3d read_look_at(const Element& element) {
   return result;
 }
 
+/// In Mitsuba 3 also one of 3 x 3.
 Eigen::Affine3d read_matrix(const Element& element) {
   element.allow_attributes({"value"});
+  if (element.dialect() == Dialect::Mitsuba3 && split_list(element.text("value")).size() == 9) {
+    const std::vector<double> linear = element.numbers("value", 9);
+    Eigen::Affine3d result = Eigen::Affine3d::Identity();
+    result.linear() = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(linear.data());
+    return result;
+  }
   const std::vector<double> m = element.numbers("value", 16);
   const Eigen::Matrix4d matrix =
       Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(m.data());
@@ -89,8 +103,8 @@ Eigen::Affine3d read_step(const Element& element) {
   if (tag == "scale") return read_scale(element);
   if (tag == "lookat" || tag == "lookAt") return read_look_at(element);
   if (tag == "matrix") return read_matrix(element);
-  element.fail("unknown transform <" + tag +
-               ">; valid are: translate, rotate, scale, lookat, matrix");
+  element.fail("unknown transform <" + tag + ">; " +
+               hint(tag, {"translate", "rotate", "scale", "lookat", "matrix"}));
 }
 
 }  // namespace

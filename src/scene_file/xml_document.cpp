@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "xml_document.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <utility>
 
+#include "excerpt.h"
+#include "nearest_names.h"
 #include "text.h"
 
 namespace driftlight {
@@ -33,18 +37,25 @@ struct DepthProbe : pugi::xml_tree_walker {
 
 }  // namespace
 
-XmlDocument::XmlDocument(const std::filesystem::path& file) : XmlDocument(file, read_text(file)) {}
+XmlDocument::XmlDocument(const std::filesystem::path& file)
+    : name_(file.string()), text_(read_text(file)) {
+  parse();
+}
 
-XmlDocument::XmlDocument(const std::filesystem::path& file, std::string text)
-    : name_(file.string()), text_(std::move(text)) {
+XmlDocument::XmlDocument(const std::filesystem::path& file, std::string text, std::string original)
+    : name_(file.string()), text_(std::move(text)), original_(std::move(original)) {
+  parse();
+}
+
+void XmlDocument::parse() {
   const pugi::xml_parse_result result =
       document_.load_buffer(text_.data(), text_.size(), pugi::parse_default, pugi::encoding_utf8);
   if (!result)
-    throw SceneError(location(static_cast<std::size_t>(std::max<std::ptrdiff_t>(result.offset, 0))),
-                     "not well-formed XML: " + std::string(result.description()));
+    fail(location(static_cast<std::size_t>(std::max<std::ptrdiff_t>(result.offset, 0))),
+         "not well-formed XML: " + std::string(result.description()));
   const pugi::xml_node second = root().next_sibling();
   if (second && second.type() == pugi::node_element)
-    throw SceneError(location(second), "a second outermost element");
+    fail(location(second), "a second outermost element");
   check_depth();
   collect_ids();
 }
@@ -53,8 +64,12 @@ void XmlDocument::check_depth() const {
   DepthProbe probe;
   root().parent().traverse(probe);
   if (probe.too_deep)
-    throw SceneError(location(probe.too_deep),
-                     "nested more than " + std::to_string(kMaximumDepth) + " levels deep");
+    fail(location(probe.too_deep),
+         "nested more than " + std::to_string(kMaximumDepth) + " levels deep");
+}
+
+void XmlDocument::fail(const SourceLocation& place, const std::string& message) const {
+  throw SceneError(place, message + excerpt(place));
 }
 
 SourceLocation XmlDocument::location(pugi::xml_node node) const {
@@ -63,17 +78,14 @@ SourceLocation XmlDocument::location(pugi::xml_node node) const {
 }
 
 SourceLocation XmlDocument::location(std::size_t offset) const {
-  SourceLocation result{name_, 1, 1};
-  for (const char c : std::string_view(text_).substr(0, offset)) {
-    const bool continues_character = (static_cast<unsigned char>(c) & 0xC0U) == 0x80U;
-    if (c == '\n') {
-      ++result.line;
-      result.column = 1;
-    } else if (!continues_character) {
-      ++result.column;
-    }
-  }
+  SourceLocation result = location_in(text_, offset);
+  result.file = name_;
+  if (original_) result.column = 1;
   return result;
+}
+
+std::string XmlDocument::excerpt(const SourceLocation& place) const {
+  return driftlight::excerpt(original_ ? *original_ : text_, place);
 }
 
 /// Of elements with the same id the first.
@@ -98,15 +110,26 @@ pugi::xml_node XmlDocument::find_id(const std::string& id) const {
   return found == ids_.end() ? pugi::xml_node() : found->second;
 }
 
+std::string Element::parent_tag() const {
+  const XmlDocument* const including = document_->including();
+  if (!is_outermost() || including == nullptr) return node_.parent().name();
+  return Element(*including, document_->include(), *surroundings_).parent_tag();
+}
+
 std::optional<std::string> Element::find(const char* attribute) const {
   const pugi::xml_attribute found = node_.attribute(attribute);
   if (!found) return std::nullopt;
-  return with_location(*this, [&] { return surroundings_->substitutions.apply(found.value()); });
+  return with_location(
+      *this, [&] { return surroundings_->substitutions.apply(found.value(), dialect()); });
 }
 
 std::string Element::text(const char* attribute) const {
   if (auto value = find(attribute)) return *std::move(value);
-  fail("<" + tag() + "> lacks the attribute '" + attribute + "'");
+  std::string message = fmt::format("<{}> lacks the attribute '{}'", tag(), attribute);
+  for (const pugi::xml_attribute other : node_.attributes())
+    if (is_slip(other.name(), attribute))
+      message += fmt::format("; is it meant by '{}'?", other.name());
+  fail(message);
 }
 
 double Element::number(const char* attribute) const {
@@ -162,22 +185,52 @@ void Element::allow_attributes(std::initializer_list<std::string_view> names) co
   for (const pugi::xml_attribute attribute : node_.attributes()) {
     const std::string_view name = attribute.name();
     if (std::find(names.begin(), names.end(), name) == names.end())
-      fail("unknown attribute '" + std::string(name) + "' of <" + tag() +
-           ">; valid are: " + join({names.begin(), names.end()}));
+      unused("unknown attribute '" + std::string(name) + "' of <" + tag() + "> is not used; " +
+             hint(name, {names.begin(), names.end()}));
   }
 }
 
 void Element::check_names() const {
-  for (const pugi::xml_attribute attribute : node_.attributes()) find(attribute.name());
-  for (const Element& child : children()) child.check_names();
+  std::optional<SceneError> first;
+  const auto check = [&](const auto& part) {
+    try {
+      part();
+    } catch (const SceneError& error) {
+      surroundings_->messages.error(error);
+      if (!first) first = error;
+    }
+  };
+  for (const pugi::xml_attribute attribute : node_.attributes())
+    check([&] { find(attribute.name()); });
+  for (const Element& child : children()) check([&] { child.check_names(); });
+  if (first) throw *first;
 }
 
-void Element::fail(const std::string& message) const { throw SceneError(location(), message); }
+void Element::fail(const std::string& message) const {
+  const SourceLocation place = location();
+  const bool shows_a_line = message.find('\n') != std::string::npos;
+  throw SceneError(place, shows_a_line ? message : message + document_->excerpt(place));
+}
+
+void Element::unused(const std::string& message) const {
+  const SourceLocation place = location();
+  surroundings_->messages.unused(place, message, document_->excerpt(place));
+}
 
 std::optional<Element> Element::find_id(const std::string& id) const {
   const pugi::xml_node node = document_->find_id(id);
   if (!node) return std::nullopt;
   return Element(*document_, node, *surroundings_);
+}
+
+std::vector<std::string> Element::ids() const {
+  std::vector<std::string> result;
+  const std::string_view name = node_.name();
+  const pugi::xml_attribute id = node_.attribute("id");
+  if (id && name != "ref" && name != "alias") result.emplace_back(id.value());
+  for (const Element& child : children())
+    for (std::string& nested : child.ids()) result.push_back(std::move(nested));
+  return result;
 }
 
 bool Element::is_inside(const Element& other) const {
