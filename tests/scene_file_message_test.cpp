@@ -280,6 +280,16 @@ TEST(Errors, OfSeveralElementsAreReportedTogether) {
   expect_contains(error, "\n3 errors");
 }
 
+// A misspelt name may be why.
+TEST(Errors, AreFollowedByWhatIsNotUsed) {
+  const std::string error =
+      error_of(complete(R"(<shape type="sphere"><float name="radious" value="1"/></shape>
+<bsdf type="velvet"/>)"));
+  expect_contains(error, "scene.xml:3:1: unknown bsdf 'velvet'");
+  EXPECT_GT(error.find("besides:\n"), error.find("velvet"));
+  expect_contains(error, "scene.xml:2:22: unknown property 'radious'");
+}
+
 TEST(Errors, OfUndefinedNamesAreAllReported) {
   const std::string error = error_of(lit(R"(<shape type="sphere">
 <float name="radius" value="$size"/><point name="center" x="$x" y="0" z="$x"/></shape>)"));

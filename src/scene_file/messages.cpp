@@ -23,10 +23,13 @@ void Messages::notice(const SourceLocation& place, const std::string& message) {
 
 void Messages::unused(const SourceLocation& place, const std::string& message,
                       const std::string& excerpt) {
-  if (strict_)
+  if (strict_) {
     error(SceneError(place, message + excerpt));
-  else
-    notice(place, message);
+    return;
+  }
+  const std::size_t before = notices_.size();
+  notice(place, message);
+  if (notices_.size() > before) unused_.push_back(notices_.back());
 }
 
 void Messages::error(const SceneError& error) {
@@ -43,11 +46,13 @@ bool Messages::is_full() const { return errors_.size() >= kMaximumErrors; }
 void Messages::throw_errors() const {
   if (errors_.empty()) return;
   const SceneError& first = errors_.front();
-  if (errors_.size() == 1) throw first;
   std::string text = std::string(first.what()).substr((to_string(first.location()) + ": ").size());
   for (std::size_t i = 1; i < errors_.size(); ++i) text += std::string("\n") + errors_[i].what();
-  text += "\n" + std::to_string(errors_.size()) +
-          (is_full() ? " errors; what comes after them is not read" : " errors");
+  if (errors_.size() > 1)
+    text += "\n" + std::to_string(errors_.size()) +
+            (is_full() ? " errors; what comes after them is not read" : " errors");
+  if (!unused_.empty()) text += "\nbesides:";
+  for (const std::string& unused : unused_) text += "\n" + unused;
   throw SceneError(first.location(), text);
 }
 

@@ -28,7 +28,8 @@ class Messages {
   bool has_errors() const { return !errors_.empty(); }
   /// True if there is no point in looking for more errors.
   bool is_full() const;
-  /// Throws the errors, if there are any, as one: each as it is, one below the other.
+  /// Throws the errors, if there are any, as one: each as it is, one below the other, then what is
+  /// not used, which may be why.
   void throw_errors() const;
 
   const std::vector<std::string>& notices() const { return notices_; }
@@ -36,6 +37,7 @@ class Messages {
  private:
   bool strict_;
   std::vector<std::string> notices_;
+  std::vector<std::string> unused_;  ///< those of the notices that are about something unused
   std::vector<SceneError> errors_;
 };
 
