@@ -276,7 +276,7 @@ TEST(ObjFile, SaysWhatIsWrongWithALibrary) {
 // Smooth glass under a mask would have two ways to transmit.
 TEST(ObjFile, GlassOfALibraryHasNoOpacity) {
   const SceneDirectory directory;
-  directory.write("some.mtl", "newmtl red\n\nnewmtl wine glass\nillum 4\nd 0.5\n");
+  directory.write("some.mtl", "newmtl red\n\nnewmtl wine glass\nillum 4\nd 0.5\nnewmtl gold\n");
   const LoadedScene loaded = load_painted(directory);
   EXPECT_TRUE(std::holds_alternative<Dielectric>(fronts(loaded.scene)[2]));
   ASSERT_EQ(loaded.notices.size(), 1U);
