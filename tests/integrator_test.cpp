@@ -69,11 +69,11 @@ void PrintTo(const BidirectionalWork& work, std::ostream* out) { *out << work.sc
 /// The caustic under a light so large that path tracing hits it often: else its rare hits would
 /// make means that are not normal.
 LoadedScene bidirectional_scene(const std::string& name) {
-  if (name == "frosted") return {frosted(), 6, {}};
-  if (name == "limelight") return {limelight(), 5, {}};
-  if (name == "coated") return {test::coated(false), 5, {}};
-  if (name == "plan") return {test::plan(false), 5, {}};
-  if (name == "lens") return {test::lens(false), 5, {}};
+  if (name == "frosted") return {frosted(), 6, {}, {}};
+  if (name == "limelight") return {limelight(), 5, {}, {}};
+  if (name == "coated") return {test::coated(false), 5, {}, {}};
+  if (name == "plan") return {test::plan(false), 5, {}, {}};
+  if (name == "lens") return {test::lens(false), 5, {}, {}};
   if (name == "ring_caustic") return load_small(name, {{"alpha", "0.2"}});
   if (name == "glass_caustic") return load_small(name, {{"light", "0.6"}});
   return load_small(name);

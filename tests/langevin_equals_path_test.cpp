@@ -121,10 +121,10 @@ LoadedScene sun_pane_in_haze() {
 /// The ring is made so rough that path tracing hits the light's reflection often: else its rare
 /// hits would make means that are not normal.
 LoadedScene load_scene_of(const std::string& name) {
-  if (name == "limelight") return {test::limelight(), 5, {}};
-  if (name == "coated") return {test::coated(false), 5, {}};
-  if (name == "plan") return {test::plan(false), 5, {}};
-  if (name == "lens") return {test::lens(false), 5, {}};
+  if (name == "limelight") return {test::limelight(), 5, {}, {}};
+  if (name == "coated") return {test::coated(false), 5, {}, {}};
+  if (name == "plan") return {test::plan(false), 5, {}, {}};
+  if (name == "lens") return {test::lens(false), 5, {}, {}};
   if (name == "sun_pane") return sun_pane_in_haze();
   if (name == "lamp_in_glass") return load_small(name, {{"filament", "0.1"}});
   if (name == "ring_caustic") return load_small(name, {{"alpha", "0.2"}});

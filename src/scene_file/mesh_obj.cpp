@@ -2,105 +2,20 @@
 #include "mesh_obj.h"
 
 #include <tbb/parallel_pipeline.h>
-#include <tiny_obj_loader.h>
 
 #include <cstdint>
 #include <fstream>
 #include <istream>
 #include <iterator>
-#include <map>
-#include <sstream>
 #include <string>
 
 #include "driftlight/error.h"
 #include "excerpt.h"
 #include "mesh.h"
-#include "obj_lines.h"
+#include "obj_text.h"
 
 namespace driftlight {
 namespace {
-
-/// What some lines of the file say. Each statement tells how many values have come before it, so
-/// that pieces of a file can be parsed side by side and taken in order.
-struct Piece {
-  struct Counts {
-    std::size_t positions = 0;
-    std::size_t normals = 0;
-    std::size_t uvs = 0;
-  };
-  enum class Kind { Polygon, Group, Material, Library };
-  struct Statement {
-    Kind kind;
-    Counts before;
-    std::size_t first;  ///< of a polygon's corners, or the name
-    std::size_t count;  ///< of a polygon's corners
-  };
-
-  std::vector<Eigen::Vector3f> positions;
-  std::vector<Eigen::Vector3f> normals;
-  std::vector<Eigen::Vector2f> uvs;
-  std::vector<tinyobj::index_t> corners;
-  std::vector<std::string> names;
-  std::vector<Statement> statements;
-
-  Counts counts() const { return {positions.size(), normals.size(), uvs.size()}; }
-  void add_polygon(const tinyobj::index_t* polygon, int count) {
-    statements.push_back(
-        {Kind::Polygon, counts(), corners.size(), static_cast<std::size_t>(count)});
-    corners.insert(corners.end(), polygon, polygon + count);
-  }
-  void add(Kind kind, const std::string& name) {
-    statements.push_back({kind, counts(), names.size(), 0});
-    names.push_back(name);
-  }
-};
-
-Piece& parsed(void* user_data) { return *static_cast<Piece*>(user_data); }
-
-tinyobj::callback_t callbacks() {
-  tinyobj::callback_t result;
-  result.vertex_cb = [](void* data, float x, float y, float z, float) {
-    parsed(data).positions.emplace_back(x, y, z);
-  };
-  result.normal_cb = [](void* data, float x, float y, float z) {
-    parsed(data).normals.emplace_back(x, y, z);
-  };
-  result.texcoord_cb = [](void* data, float u, float v, float) {
-    parsed(data).uvs.emplace_back(u, v);
-  };
-  result.index_cb = [](void* data, tinyobj::index_t* corners, int count) {
-    parsed(data).add_polygon(corners, count);
-  };
-  result.group_cb = [](void* data, const char**, int) { parsed(data).add(Piece::Kind::Group, ""); };
-  result.usemtl_cb = [](void* data, const char* name, int) {
-    parsed(data).add(Piece::Kind::Material, name);
-  };
-  return result;
-}
-
-/// Notes the names of .mtl files and reads none.
-class LibraryNames : public tinyobj::MaterialReader {
- public:
-  explicit LibraryNames(Piece& piece) : piece_(piece) {}
-  bool operator()(const std::string& name, std::vector<tinyobj::material_t>*,
-                  std::map<std::string, int>*, std::string*, std::string*) override {
-    piece_.add(Piece::Kind::Library, name);
-    return true;
-  }
-
- private:
-  Piece& piece_;
-};
-
-/// The parser takes what it does not understand for zeros, so that the lines are looked at before.
-Piece parse(const std::string& lines) {
-  if (const auto problem = find_unreadable_line(lines)) throw InputError(problem->message);
-  Piece result;
-  LibraryNames libraries(result);
-  std::istringstream stream(lines);
-  tinyobj::LoadObjWithCallback(stream, callbacks(), &result, &libraries);
-  return result;
-}
 
 /// Whole lines, 64 KiB or somewhat more; none at the end.
 std::string read_lines(std::istream& stream) {
@@ -118,27 +33,33 @@ class ObjReader {
  public:
   explicit ObjReader(const ObjOptions& options) : options_(options) {}
 
-  void add(const Piece& piece) {
-    Piece::Counts taken;
-    for (const Piece::Statement& statement : piece.statements) {
+  /// Throws LineError.
+  void add(const ObjPiece& piece) {
+    ObjPiece::Counts taken;
+    for (const ObjPiece::Statement& statement : piece.statements) {
       add_values(piece, taken, statement.before);
       taken = statement.before;
+      line_ = lines_ + statement.line;
       switch (statement.kind) {
-        case Piece::Kind::Polygon:
+        case ObjPiece::Kind::Polygon:
           add_polygon(&piece.corners[statement.first], statement.count);
           break;
-        case Piece::Kind::Group:
+        case ObjPiece::Kind::Group:
           start_group();
           break;
-        case Piece::Kind::Material:
-          start_material(piece.names[statement.first]);
+        case ObjPiece::Kind::Material:
+          start_group();
+          material_ = piece.names[statement.first];
           break;
-        case Piece::Kind::Library:
+        case ObjPiece::Kind::Library:
           file_.library = piece.names[statement.first];
           break;
       }
     }
-    add_values(piece, taken, piece.counts());
+    if (piece.problem) throw LineError(lines_ + piece.problem->line, piece.problem->message);
+    const auto size = [](const auto& values) { return static_cast<std::uint32_t>(values.size()); };
+    add_values(piece, taken, {size(piece.positions), size(piece.normals), size(piece.uvs)});
+    lines_ += piece.line_count;
   }
 
   ObjFile take() {
@@ -161,7 +82,7 @@ class ObjReader {
     std::uint32_t vertex = 0;
   };
 
-  void add_values(const Piece& piece, const Piece::Counts& from, const Piece::Counts& to) {
+  void add_values(const ObjPiece& piece, const ObjPiece::Counts& from, const ObjPiece::Counts& to) {
     for (std::size_t i = from.positions; i < to.positions; ++i)
       positions_.push_back(piece.positions[i]);
     for (std::size_t i = from.normals; i < to.normals; ++i) normals_.push_back(piece.normals[i]);
@@ -172,8 +93,7 @@ class ObjReader {
   }
 
   /// A fan, as Mitsuba makes of polygons.
-  void add_polygon(const tinyobj::index_t* corners, std::size_t count) {
-    if (count < 3) throw InputError("a face has fewer than three corners");
+  void add_polygon(const ObjPiece::Corner* corners, std::size_t count) {
     const std::uint32_t first = vertex(corners[0]);
     std::uint32_t last = vertex(corners[1]);
     for (std::size_t i = 2; i < count; ++i) {
@@ -186,28 +106,24 @@ class ObjReader {
   void start_group() {
     if (!options_.one_mesh) finish_mesh();
   }
-  void start_material(const std::string& name) {
-    start_group();
-    material_ = name.substr(0, name.find_last_not_of(" \t\r") + 1);
-  }
 
   /// From 1, or from the end if negative, to an index from 0.
   template <class T>
-  static std::uint32_t index(int from_one, const std::vector<T>& values, const char* what) {
+  std::uint32_t index(int from_one, const std::vector<T>& values, const char* what) const {
     const auto size = static_cast<long long>(values.size());
     const long long i = from_one < 0 ? size + from_one : from_one - 1LL;
     if (i < 0 || i >= size)
-      throw InputError("a face refers to " + std::string(what) + " " + std::to_string(from_one) +
-                       ", but there are only " + std::to_string(size));
+      throw LineError(line_, "a face refers to " + std::string(what) + " " +
+                                 std::to_string(from_one) + ", but there are only " +
+                                 std::to_string(size));
     return static_cast<std::uint32_t>(i);
   }
 
   /// A new vertex, unless the corner is the one last seen at its position, as most are.
-  std::uint32_t vertex(const tinyobj::index_t& indices) {
-    Corner corner{index(indices.vertex_index, positions_, "vertex"), kNone, kNone};
-    if (indices.normal_index != 0) corner.normal = index(indices.normal_index, normals_, "normal");
-    if (indices.texcoord_index != 0)
-      corner.uv = index(indices.texcoord_index, uvs_, "texture coordinate");
+  std::uint32_t vertex(const ObjPiece::Corner& indices) {
+    Corner corner{index(indices.position, positions_, "vertex"), kNone, kNone};
+    if (indices.normal != 0) corner.normal = index(indices.normal, normals_, "normal");
+    if (indices.uv != 0) corner.uv = index(indices.uv, uvs_, "texture coordinate");
     if (seen_.size() < positions_.size()) seen_.resize(positions_.size());
     Seen& seen = seen_[corner.position];
     const std::size_t part = file_.parts.size() + 1;
@@ -239,6 +155,8 @@ class ObjReader {
   }
 
   ObjOptions options_;
+  int lines_ = 0;  ///< of the pieces before
+  int line_ = 0;   ///< of the statement
   std::vector<Eigen::Vector3f> positions_;
   std::vector<Eigen::Vector3f> normals_;
   std::vector<Eigen::Vector2f> uvs_;
@@ -265,15 +183,16 @@ ObjFile read_pieces(std::istream& stream, const ObjOptions& options) {
   ObjReader reader(options);
   skip_byte_order_mark(stream);
   tbb::parallel_pipeline(
-      kAtATime, tbb::make_filter<void, std::string>(tbb::filter_mode::serial_in_order,
-                                                    [&](tbb::flow_control& control) {
-                                                      std::string lines = read_lines(stream);
-                                                      if (lines.empty()) control.stop();
-                                                      return lines;
-                                                    }) &
-                    tbb::make_filter<std::string, Piece>(tbb::filter_mode::parallel, &parse) &
-                    tbb::make_filter<Piece, void>(tbb::filter_mode::serial_in_order,
-                                                  [&](const Piece& piece) { reader.add(piece); }));
+      kAtATime,
+      tbb::make_filter<void, std::string>(tbb::filter_mode::serial_in_order,
+                                          [&](tbb::flow_control& control) {
+                                            std::string lines = read_lines(stream);
+                                            if (lines.empty()) control.stop();
+                                            return lines;
+                                          }) &
+          tbb::make_filter<std::string, ObjPiece>(tbb::filter_mode::parallel, &parse_obj) &
+          tbb::make_filter<ObjPiece, void>(tbb::filter_mode::serial_in_order,
+                                           [&](const ObjPiece& piece) { reader.add(piece); }));
   return reader.take();
 }
 
@@ -285,12 +204,11 @@ ObjFile read_obj(const std::filesystem::path& file, const ObjOptions& options) {
     throw InputError("the mesh '" + file.string() + "' cannot be opened");
   try {
     return read_pieces(stream, options);
-  } catch (const InputError& error) {
-    // Only now it matters which line it was.
+  } catch (const LineError& error) {
     std::ifstream again(file, std::ios::binary);
     const std::string text{std::istreambuf_iterator<char>(again), std::istreambuf_iterator<char>()};
-    if (const auto problem = find_obj_problem(text))
-      throw InputError(problem_in_line(file, text, problem->line, problem->message));
+    throw InputError(problem_in_line(file, text, error.line(), error.what()));
+  } catch (const InputError& error) {
     throw InputError("the mesh '" + file.string() + "' is not usable: " + error.what());
   }
 }
