@@ -101,10 +101,11 @@ class ObjText {
   void parse_face() {
     const auto first = static_cast<std::uint32_t>(piece_.corners.size());
     for (skip_blanks(); !is_end_of_line(*at_) && *at_ != '#'; skip_blanks()) {
-      const std::string_view text = word();
+      const char* const start = at_;
       ObjPiece::Corner corner;
       if (!parse_corner(corner)) {
-        fail(in_quotes(text) + " is not a corner of a face, such as 1, 1/2, 1//3 or 1/2/3");
+        at_ = start;
+        fail(in_quotes(word()) + " is not a corner of a face, such as 1, 1/2, 1//3 or 1/2/3");
         return;
       }
       piece_.corners.push_back(corner);

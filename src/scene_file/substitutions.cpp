@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "substitutions.h"
 
+#include <fmt/format.h>
+
 #include "nearest_names.h"
 
 namespace driftlight {
@@ -76,9 +78,9 @@ std::string Substitutions::apply(const std::string& text, Dialect dialect) {
 void Substitutions::check_defines_used(const std::filesystem::path& file) const {
   std::string message;
   for (const std::string& name : unused_defines_)
-    message += (message.empty() ? "" : "; ") + ("the definition of '" + name) +
-               "' is not used: the scene has no $" + name + "; " +
-               hint(name, {declared_.begin(), declared_.end()});
+    message += fmt::format("{}the definition of '{}' is not used: the scene has no ${}; {}",
+                           message.empty() ? "" : "; ", name, name,
+                           hint(name, {declared_.begin(), declared_.end()}));
   if (!message.empty()) throw SceneError({file.string()}, message);
 }
 
