@@ -77,6 +77,7 @@ struct Chains {
     const std::vector<PathSampler::Sample> starts = bootstrap.resample(options.chains);
     const auto start_all = [&](Film& on, std::uint64_t seed, StepLayers* layers) {
       std::vector<std::unique_ptr<Chain>> chains;
+      chains.reserve(starts.size());
       for (const PathSampler::Sample& start : starts)
         chains.push_back(std::make_unique<Chain>(
             scene, *sampler, options, on, start,
