@@ -191,7 +191,9 @@ void add_daylight(Properties& properties, LoadContext& context, double sky_scale
                            sun_scale * solid_angle * Daylight(turbidity, sun).sun()});
   }
   if (how.sky_scale == 0.0 && how.sun_scale == 0.0) return;
-  properties.finish();  // what is wrong is to be said before a large map is computed
+  // What is wrong is to be said before a large map is computed.
+  properties.finish();
+  if (context.surroundings.messages.has_errors()) return;
   with_location(properties.element(), [&] {
     context.builder.set_environment(
         EnvironmentMap(daylight_map(turbidity, sun, how), to_world, 1.0));
