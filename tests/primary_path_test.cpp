@@ -171,6 +171,13 @@ TEST(PrimaryPath, GradientIsThatOfDifferences) {
   }
 }
 
+/// A gradient that comes with other derivatives is the one by itself.
+void expect_gradient(const PrimaryFunction& function, const Found& found, const Vector& gradient) {
+  PrimaryDerivatives alone;
+  ASSERT_TRUE(function.gradient(found.numbers, found.path, alone));
+  EXPECT_LE((alone.gradient - gradient).norm(), 1e-9 * (1.0 + alone.gradient.norm()));
+}
+
 TEST(PrimaryPath, HessianIsThatOfDifferencesOfGradients) {
   for (const TestScene& test : test_scenes()) {
     const EmissionGuide unguided(test.scene);
@@ -180,9 +187,7 @@ TEST(PrimaryPath, HessianIsThatOfDifferencesOfGradients) {
     PrimaryDerivatives moved;
     for (const Found& found : found_paths(test.scene, 2, 1500, 13)) {
       if (!function.gradient_and_hessian(found.numbers, found.path, derivatives)) continue;
-      ASSERT_TRUE(function.gradient(found.numbers, found.path, moved));
-      EXPECT_LE((moved.gradient - derivatives.gradient).norm(),
-                1e-9 * (1.0 + moved.gradient.norm()));
+      expect_gradient(function, found, derivatives.gradient);
       const double scale = derivatives.hessian.cwiseAbs().maxCoeff();
       for (int i = 0; i < derivatives.gradient.size(); i += 3) {
         const int j = (2 * i + 1) % static_cast<int>(derivatives.gradient.size());
@@ -206,13 +211,10 @@ TEST(PrimaryPath, ConstraintsAreThoseOfDifferences) {
     const PrimaryFunction function(test.scene, unguided);
     Agreement agreement;
     PrimaryDerivatives derivatives;
-    PrimaryDerivatives alone;
     Rng rng(19, Stream::Test, 0);
     for (const Found& found : found_paths(test.scene, 6, 3000, 18)) {
       if (!function.gradient_and_constraints(found.numbers, found.path, derivatives)) continue;
-      ASSERT_TRUE(function.gradient(found.numbers, found.path, alone));
-      EXPECT_LE((alone.gradient - derivatives.gradient).norm(),
-                1e-9 * (1.0 + alone.gradient.norm()));
+      expect_gradient(function, found, derivatives.gradient);
       // x^T Q x = 1/9 sum_k w_k (dr_k / dx)^2 along some direction x.
       const int d = static_cast<int>(derivatives.gradient.size());
       Vector x(d);
