@@ -2,13 +2,15 @@
 #include "mesh.h"
 
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
+#include <tbb/parallel_for_each.h>
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <bit>
 #include <boost/container_hash/hash.hpp>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 
 #include "driftlight/error.h"
 
@@ -48,7 +50,7 @@ bool all_finite(const std::vector<Vector>& vectors) {
 
 /// In parallel by blocks of triangles, which are added up in their order.
 std::vector<Vec3d> normal_sums(const TriangleMesh& mesh) {
-  constexpr std::size_t kBlock = std::size_t{1} << 16U;
+  constexpr std::size_t kBlock = std::size_t{1} << 13U;
   std::vector<Vec3d> sums(mesh.positions.size(), Vec3d::Zero());
   std::vector<std::array<Vec3d, 3>> normals(std::min(kBlock, mesh.triangles.size()));
   for (std::size_t first = 0; first < mesh.triangles.size(); first += kBlock) {
@@ -87,40 +89,57 @@ std::size_t fill_zero_normals(TriangleMesh& mesh) {
   return static_cast<std::size_t>(count);
 }
 
-/// Of a vertex: position, normal and texture coordinates; the latter two zero where absent.
-std::array<float, 8> vertex_key(const TriangleMesh& mesh, std::uint32_t vertex) {
-  const Eigen::Vector3f& p = mesh.positions[vertex];
-  Eigen::Vector3f n = Eigen::Vector3f::Zero();
-  Eigen::Vector2f uv = Eigen::Vector2f::Zero();
-  if (!mesh.normals.empty()) n = mesh.normals[vertex];
-  if (!mesh.uvs.empty()) uv = mesh.uvs[vertex];
-  return {p.x(), p.y(), p.z(), n.x(), n.y(), n.z(), uv.x(), uv.y()};
+/// The bits of a vertex: position, normal and texture coordinates, the latter two zero where
+/// absent. Minus zero is zero.
+using VertexKey = std::array<std::uint64_t, 4>;
+
+VertexKey vertex_key(const TriangleMesh& mesh, std::uint32_t vertex) {
+  std::array<float, 8> values{};
+  const auto put = [&](const auto& vector, std::size_t first) {
+    std::copy_n(vector.data(), vector.size(), &values[first]);
+  };
+  put(mesh.positions[vertex], 0);
+  if (!mesh.normals.empty()) put(mesh.normals[vertex], 3);
+  if (!mesh.uvs.empty()) put(mesh.uvs[vertex], 6);
+  for (float& value : values) value += 0.0F;
+  return std::bit_cast<VertexKey>(values);
 }
 
-/// The first vertex that equals each one.
-std::vector<std::uint32_t> first_equals(const TriangleMesh& mesh) {
-  struct Hashed {
-    std::size_t hash;
-    std::uint32_t vertex;
-  };
-  std::vector<Hashed> sorted(mesh.positions.size());
-  tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(sorted.size()),
-                    [&](std::uint32_t i) {
-                      sorted[i] = {boost::hash_value(vertex_key(mesh, i)), i};
-                    });
-  tbb::parallel_sort(sorted, [&](const Hashed& a, const Hashed& b) {
-    if (a.hash != b.hash) return a.hash < b.hash;
-    const auto key_a = vertex_key(mesh, a.vertex);
-    const auto key_b = vertex_key(mesh, b.vertex);
-    return key_a != key_b ? key_a < key_b : a.vertex < b.vertex;
+/// Hashes of vertices, in the upper half of each number, and their indices, in the lower, by
+/// buckets that fit into the cache.
+std::vector<std::vector<std::uint64_t>> hashed_vertices(const TriangleMesh& mesh) {
+  constexpr std::size_t kBucketSize = 4096;
+  const auto count = static_cast<std::uint32_t>(mesh.positions.size());
+  std::vector<std::uint32_t> hashes(count);
+  tbb::parallel_for(std::uint32_t{0}, count, [&](std::uint32_t i) {
+    hashes[i] = static_cast<std::uint32_t>(boost::hash_value(vertex_key(mesh, i)));
   });
-  std::vector<std::uint32_t> result(sorted.size());
-  for (std::size_t i = 0; i < sorted.size(); ++i) {
-    const bool equals =
-        i > 0 && sorted[i].hash == sorted[i - 1].hash &&
-        vertex_key(mesh, sorted[i].vertex) == vertex_key(mesh, sorted[i - 1].vertex);
-    result[sorted[i].vertex] = equals ? result[sorted[i - 1].vertex] : sorted[i].vertex;
-  }
+  std::vector<std::vector<std::uint64_t>> buckets(count / kBucketSize + 1);
+  for (std::uint32_t i = 0; i < count; ++i)
+    buckets[hashes[i] % buckets.size()].push_back(std::uint64_t{hashes[i]} << 32U | i);
+  return buckets;
+}
+
+/// The first of all vertices that equal each one.
+std::vector<std::uint32_t> first_equals(const TriangleMesh& mesh) {
+  std::vector<std::uint32_t> result(mesh.positions.size());
+  std::iota(result.begin(), result.end(), 0U);
+  auto buckets = hashed_vertices(mesh);
+  tbb::parallel_for_each(buckets, [&](std::vector<std::uint64_t>& bucket) {
+    std::sort(bucket.begin(), bucket.end());
+    std::vector<std::uint32_t> distinct;  // of those of the same hash
+    for (std::size_t i = 0; i < bucket.size(); ++i) {
+      if (i == 0 || bucket[i] >> 32U != bucket[i - 1] >> 32U) distinct.clear();
+      const auto vertex = static_cast<std::uint32_t>(bucket[i]);
+      const auto equal = std::find_if(distinct.begin(), distinct.end(), [&](std::uint32_t other) {
+        return vertex_key(mesh, other) == vertex_key(mesh, vertex);
+      });
+      if (equal == distinct.end())
+        distinct.push_back(vertex);
+      else
+        result[vertex] = *equal;
+    }
+  });
   return result;
 }
 
@@ -176,8 +195,10 @@ void merge_equal_vertices(TriangleMesh& mesh) {
   mesh.positions.resize(count);
   if (!mesh.normals.empty()) mesh.normals.resize(count);
   if (!mesh.uvs.empty()) mesh.uvs.resize(count);
-  for (auto& triangle : mesh.triangles)
-    for (std::uint32_t& vertex : triangle) vertex = merged[vertex];
+  if (count == merged.size()) return;
+  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
+    for (std::uint32_t& vertex : mesh.triangles[t]) vertex = merged[vertex];
+  });
 }
 
 void transform_mesh(TriangleMesh& mesh, const Eigen::Affine3d& to_world) {

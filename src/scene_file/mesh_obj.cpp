@@ -72,20 +72,21 @@ class ObjReader {
   /// Indices from 0; kNone where a corner has no normal or texture coordinates.
   struct Corner {
     std::uint32_t position, normal, uv;
-    bool operator==(const Corner&) const = default;
   };
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
   /// The last corner at a position, by its part of the file, counted from 1, and its vertex there.
   struct Seen {
-    std::size_t part = 0;
-    Corner corner{};
+    std::uint32_t part = 0;
+    std::uint32_t normal = kNone;
+    std::uint32_t uv = kNone;
     std::uint32_t vertex = 0;
   };
 
   void add_values(const ObjPiece& piece, const ObjPiece::Counts& from, const ObjPiece::Counts& to) {
-    for (std::size_t i = from.positions; i < to.positions; ++i)
-      positions_.push_back(piece.positions[i]);
-    for (std::size_t i = from.normals; i < to.normals; ++i) normals_.push_back(piece.normals[i]);
+    positions_.insert(positions_.end(), piece.positions.begin() + from.positions,
+                      piece.positions.begin() + to.positions);
+    normals_.insert(normals_.end(), piece.normals.begin() + from.normals,
+                    piece.normals.begin() + to.normals);
     for (std::size_t i = from.uvs; i < to.uvs; ++i) {
       const Eigen::Vector2f& uv = piece.uvs[i];
       uvs_.emplace_back(uv.x(), options_.flip_tex_coords ? 1 - uv.y() : uv.y());
@@ -126,32 +127,34 @@ class ObjReader {
     if (indices.uv != 0) corner.uv = index(indices.uv, uvs_, "texture coordinate");
     if (seen_.size() < positions_.size()) seen_.resize(positions_.size());
     Seen& seen = seen_[corner.position];
-    const std::size_t part = file_.parts.size() + 1;
-    if (seen.part != part || seen.corner != corner) seen = {part, corner, new_vertex(corner)};
+    const auto part = static_cast<std::uint32_t>(file_.parts.size() + 1);
+    if (seen.part != part || seen.normal != corner.normal || seen.uv != corner.uv)
+      seen = {part, corner.normal, corner.uv, new_vertex(corner)};
     return seen.vertex;
   }
 
-  /// Normal and texture coordinates are zero where absent.
   std::uint32_t new_vertex(const Corner& corner) {
-    const bool has_normal = corner.normal != kNone;
-    const bool has_uv = corner.uv != kNone;
-    has_normals_ |= has_normal;
-    has_uvs_ |= has_uv;
+    add_to_vertex(mesh_.normals, normals_, corner.normal);
+    add_to_vertex(mesh_.uvs, uvs_, corner.uv);
     mesh_.positions.push_back(positions_[corner.position]);
-    mesh_.normals.push_back(has_normal ? normals_[corner.normal] : Eigen::Vector3f::Zero());
-    mesh_.uvs.push_back(has_uv ? uvs_[corner.uv] : Eigen::Vector2f::Zero());
     return static_cast<std::uint32_t>(mesh_.positions.size() - 1);
+  }
+
+  /// Zero where absent; if no vertex of the mesh has any so far, there are none.
+  template <class Vector>
+  void add_to_vertex(std::vector<Vector>& of_mesh, const std::vector<Vector>& values,
+                     std::uint32_t i) {
+    if (of_mesh.empty() && i == kNone) return;
+    of_mesh.resize(mesh_.positions.size(), Vector::Zero());
+    of_mesh.push_back(i == kNone ? Vector(Vector::Zero()) : values[i]);
   }
 
   void finish_mesh() {
     if (mesh_.triangles.empty()) return;
-    if (!has_normals_) mesh_.normals.clear();
-    if (!has_uvs_) mesh_.uvs.clear();
     check_mesh(mesh_);
     merge_equal_vertices(mesh_);
     file_.parts.push_back({std::move(mesh_), material_});
     mesh_ = {};
-    has_normals_ = has_uvs_ = false;
   }
 
   ObjOptions options_;
@@ -164,8 +167,6 @@ class ObjReader {
   TriangleMesh mesh_;
   std::string material_;
   std::vector<Seen> seen_;  ///< at each position
-  bool has_normals_ = false;
-  bool has_uvs_ = false;
 };
 
 /// What some programs put before a text in UTF-8.
