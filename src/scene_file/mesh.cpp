@@ -3,6 +3,7 @@
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_for_each.h>
+#include <tbb/parallel_invoke.h>
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -48,20 +49,30 @@ bool all_finite(const std::vector<Vector>& vectors) {
   return std::all_of(vectors.begin(), vectors.end(), [](const Vector& v) { return v.allFinite(); });
 }
 
-/// In parallel by blocks of triangles, which are added up in their order.
+/// By blocks of triangles, which are added up in their order, each while those of the next are
+/// found in parallel.
 std::vector<Vec3d> normal_sums(const TriangleMesh& mesh) {
   constexpr std::size_t kBlock = std::size_t{1} << 13U;
+  const std::size_t count = mesh.triangles.size();
   std::vector<Vec3d> sums(mesh.positions.size(), Vec3d::Zero());
-  std::vector<std::array<Vec3d, 3>> normals(std::min(kBlock, mesh.triangles.size()));
-  for (std::size_t first = 0; first < mesh.triangles.size(); first += kBlock) {
-    const std::size_t count = std::min(kBlock, mesh.triangles.size() - first);
-    tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-      normals[i] = weighted_normals(mesh, mesh.triangles[first + i]);
+  std::array<std::vector<std::array<Vec3d, 3>>, 2> normals;
+  const auto find = [&](std::size_t block) {
+    auto& found = normals[block % 2];
+    const std::size_t first = block * kBlock;
+    found.resize(first < count ? std::min(kBlock, count - first) : 0);
+    tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t i) {
+      found[i] = weighted_normals(mesh, mesh.triangles[first + i]);
     });
-    for (std::size_t i = 0; i < count; ++i)
+  };
+  const auto add = [&](std::size_t block) {
+    const auto& found = normals[block % 2];
+    for (std::size_t i = 0; i < found.size(); ++i)
       for (std::size_t corner = 0; corner < 3; ++corner)
-        sums[mesh.triangles[first + i][corner]] += normals[i][corner];
-  }
+        sums[mesh.triangles[block * kBlock + i][corner]] += found[i][corner];
+  };
+  find(0);
+  for (std::size_t block = 0; block * kBlock < count; ++block)
+    tbb::parallel_invoke([&] { add(block); }, [&] { find(block + 1); });
   return sums;
 }
 
