@@ -55,7 +55,8 @@ BlurredAreaEmitter::Gradient BlurredAreaEmitter::log_share_gradient(const Ray<do
   return {lamp_.axes.transpose() * by_u, lamp_.axes.transpose() * (lobe * 2.0 * t * dy)};
 }
 
-/// t = -B / E, B = u.Dv, E = v.Dv:  dt = -(Dv.du + (Du + 2 t Dv).dv) / E
+/// t = -B / E, B = u.Dv, E = v.Dv, and D follows the distance, dM = 2 sigma^2 u.du I:
+///   dt = -((Dv - 2 sigma^2 (Dy.Dv) u).du + (Du + 2 t Dv).dv) / E
 BlurredAreaEmitter::ApproachDifferential BlurredAreaEmitter::approach_differential(
     const Ray<double>& ray) const {
   const Vec3d u = principal(Vec3d(ray.origin - lamp_.center));
@@ -67,7 +68,8 @@ BlurredAreaEmitter::ApproachDifferential BlurredAreaEmitter::approach_differenti
   if (along >= 0.0) return {0.0, Vec3d::Zero(), Vec3d::Zero()};
   const double square = v.dot(dv);
   const double t = -along / square;
-  return {t, lamp_.axes.transpose() * (-dv / square),
+  const double by_distance = 2.0 * sigma2_ * (du + t * dv).dot(dv);
+  return {t, lamp_.axes.transpose() * ((by_distance * u - dv) / square),
           lamp_.axes.transpose() * (-(du + 2.0 * t * dv) / square)};
 }
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <vector>
 
 #include "driftlight/emitter.h"
 
@@ -29,28 +30,43 @@ struct Rows {
   int height;
 };
 
-/// Cosines and sines of the angles phi of the columns.
+/// Cosines and sines of the angles phi of the columns, twice around, so that a stretch of columns
+/// need not wrap.
 struct Columns {
   explicit Columns(const Bitmap& bitmap) : width(bitmap.width), per_column(2.0 * kPi / width) {
-    for (int x = 0; x < width; ++x) {
-      cosine.push_back(std::cos(phi(x)));
-      sine.push_back(std::sin(phi(x)));
-    }
+    const Eigen::ArrayXd phis =
+        (Eigen::ArrayXd::LinSpaced(2 * width, 0.0, 2.0 * width - 1.0) + 0.5) * per_column;
+    cosine = phis.cos();
+    sine = phis.sin();
   }
 
   double phi(int column) const { return (column + 0.5) * per_column; }
 
   int width;
   double per_column;
-  std::vector<double> cosine;
-  std::vector<double> sine;
+  Eigen::ArrayXd cosine;
+  Eigen::ArrayXd sine;
 };
 
-/// The map blurred at a texel of another grid.
+/// One channel of a bitmap, its columns likewise twice.
+using Plane = Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+std::array<Plane, 3> planes_of(const Bitmap& bitmap) {
+  std::array<Plane, 3> planes;
+  for (Plane& plane : planes) plane.resize(bitmap.height, 2 * bitmap.width);
+  for (int y = 0; y < bitmap.height; ++y)
+    for (int x = 0; x < bitmap.width; ++x)
+      for (int c = 0; c < 3; ++c)
+        planes[static_cast<std::size_t>(c)](y, x) =
+            planes[static_cast<std::size_t>(c)](y, x + bitmap.width) = bitmap.at(x, y)[c];
+  return planes;
+}
+
+/// The map blurred at texels of another grid.
 class Blur {
  public:
   Blur(const Bitmap& from, const Bitmap& to, double sigma)
-      : from_(from),
+      : planes_(planes_of(from)),
         rows_(from),
         columns_(from),
         to_rows_(to),
@@ -61,8 +77,10 @@ class Blur {
 
   Eigen::Array3f operator()(int column, int row) const {
     const double theta = to_rows_.theta(row);
+    const double phi = to_columns_.phi(column);
     Rgbd sum = Rgbd::Zero();
     double weights = 0.0;
+    Eigen::ArrayXd w(columns_.width);
     for (int y = rows_.at(theta - reach_); y <= rows_.at(theta + reach_); ++y) {
       // cos gamma = along + across cos(delta phi)
       const double along = std::cos(theta) * std::cos(rows_.theta(y));
@@ -70,32 +88,29 @@ class Blur {
       const double least = (least_ - along) / across;
       if (least >= 1.0) continue;
       const double widest = least > -1.0 ? std::acos(least) : kPi;
-      const auto u = static_cast<std::size_t>(column);
-      const double across_cosine = across * to_columns_.cosine[u];
-      const double across_sine = across * to_columns_.sine[u];
-      const double area = rows_.area(y);
-      const double phi = to_columns_.phi(column);
-      const int first =
-          static_cast<int>(std::floor((phi - widest) / columns_.per_column - 0.5)) + columns_.width;
+      const int first = (static_cast<int>(std::floor((phi - widest) / columns_.per_column - 0.5)) +
+                         columns_.width) %
+                        columns_.width;
       const int count = std::min(
           static_cast<int>(std::ceil(2.0 * widest / columns_.per_column)) + 2, columns_.width);
-      for (int i = first; i < first + count; ++i) {
-        const int x = i % columns_.width;
-        const auto v = static_cast<std::size_t>(x);
-        const double cosine =
-            along + across_cosine * columns_.cosine[v] + across_sine * columns_.sine[v];
-        const double t = 1.0 - (1.0 - cosine) * inverse_;
-        if (t <= 0.0) continue;
-        const double w = area * t * t * t;
-        sum += w * from_.at(x, y).cast<double>();
-        weights += w;
+      w.head(count) =
+          (1.0 - inverse_ +
+           inverse_ * (along + across * std::cos(phi) * columns_.cosine.segment(first, count) +
+                       across * std::sin(phi) * columns_.sine.segment(first, count)))
+              .max(0.0)
+              .cube();
+      const double area = rows_.area(y);
+      weights += area * w.head(count).sum();
+      for (int c = 0; c < 3; ++c) {
+        const auto stretch = planes_[static_cast<std::size_t>(c)].row(y).segment(first, count);
+        sum[c] += area * (w.head(count) * stretch.cast<double>().transpose()).sum();
       }
     }
     return (sum / weights).cast<float>();
   }
 
  private:
-  const Bitmap& from_;
+  std::array<Plane, 3> planes_;
   Rows rows_;
   Columns columns_;
   Rows to_rows_;

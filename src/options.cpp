@@ -195,6 +195,8 @@ std::vector<OptionEntry> splitting_entries(SplittingOptions& options) {
       number_or_auto("level_steps", options.steps, Range<int>{0, 1000000},
                      "steps of a particle at each softer level; auto: 4, or 16 where narrow lobes "
                      "are softened"),
+      number("level_scale", options.scale, Range<double>{.low = 0, .open = true},
+             "scale of those steps, over that of all others"),
       number("level_trust", options.trust, Range<double>{.low = 0, .open = true},
              "trust of the steps of particles"),
       number("last_steps", options.last_steps, Range<int>{1, 1000000},

@@ -28,10 +28,18 @@ Copies copies(double ratio, Rng& rng) {
   return {ratio > 0.0 ? static_cast<int>(std::floor(ratio + u)) : 0, 1.0};
 }
 
-/// The kernel of particles.
-KernelOptions particle_kernel(const LangevinOptions& options) {
+/// The kernel of particles in the scene itself.
+KernelOptions last_kernel(const LangevinOptions& options) {
   KernelOptions kernel = options.kernel;
   kernel.trust = options.splitting.trust;
+  return kernel;
+}
+
+/// At the softer levels, where short steps would waste those few that there are.
+KernelOptions level_kernel(const LangevinOptions& options) {
+  KernelOptions kernel = last_kernel(options);
+  kernel.scale *= options.splitting.scale;
+  kernel.scale_decades *= 0.5;
   return kernel;
 }
 
@@ -80,12 +88,13 @@ struct Splitter::Particles {
         remainder(of_remainder),
         brightness(with_brightness),
         scene(scenes[0]),
-        kernel(particle_kernel(options)),
+        kernel_of_last(last_kernel(options)),
+        kernel_of_levels(level_kernel(options)),
         steps(options.splitting.steps.value_or(scenes.soften_lobes() ? kStepsInLobes : kSteps)),
-        last(scene, kernel, remainder, layers),
+        last(scene, kernel_of_last, remainder, layers),
         figures(static_cast<std::size_t>(scenes.top()) + 1) {
     for (int k = 1; k <= scenes.top(); ++k)
-      levels.push_back(std::make_unique<Level>(scenes[k], kernel));
+      levels.push_back(std::make_unique<Level>(scenes[k], kernel_of_levels));
   }
 
   Level& level(int k) { return *levels[static_cast<std::size_t>(k - 1)]; }
@@ -175,7 +184,8 @@ struct Splitter::Particles {
   const Remainder& remainder;
   const BrightnessMap& brightness;
   const Scene& scene;
-  KernelOptions kernel;
+  KernelOptions kernel_of_last;
+  KernelOptions kernel_of_levels;
   int steps;                                   ///< at each softer level
   std::vector<std::unique_ptr<Level>> levels;  ///< 1 and above
   RemainderChain last;

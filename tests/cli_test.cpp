@@ -393,6 +393,36 @@ TEST_F(Cli, PathTracerReportsItsSamples) {
   EXPECT_EQ(json.at("options").at("max_depth"), 4);
 }
 
+// Two samples a pixel start so few particles that their light is not to be trusted.
+TEST_F(Cli, ParticlesAreReportedAndDoubtedWhereTheyAreFew) {
+  const std::vector<std::string> arguments{"render",  test::own_scene("sun_pane").string(),
+                                           "-D",      "width=48",
+                                           "-D",      "height=36",
+                                           "--spp",   "2",
+                                           "--set",   "split=all",
+                                           "--set",   "splitting_pilot=1024",
+                                           "--set",   "pilot=4096",
+                                           "-o",      "a.exr",
+                                           "--stats", "s.json",
+                                           "-v"};
+  const Outcome outcome = run(arguments);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("of the light rests on so few families"), std::string::npos)
+      << outcome.err;
+  EXPECT_NE(outcome.out.find("level 0: "), std::string::npos) << outcome.out;
+  const auto splitting = nlohmann::json::parse(read("s.json")).at("splitting");
+  EXPECT_GT(splitting.at("lobe_sequences"), 0);
+  EXPECT_GT(splitting.at("effective_families"), 1.0);
+  EXPECT_GT(splitting.at("mean"), 0.0);
+  EXPECT_LE(splitting.at("mean_of_few_families"), splitting.at("mean"));
+  ASSERT_GT(splitting.at("levels").size(), 1U);
+  for (const auto& level : splitting.at("levels")) {
+    EXPECT_GT(level.at("particles"), 0);
+    EXPECT_GT(level.at("steps"), 0);
+    EXPECT_GT(level.at("acceptance"), 0.0);
+  }
+}
+
 // The sampler's number is the default of what counts samples, and is spoken of only there.
 TEST_F(Cli, TheSamplerSaysHowManySamples) {
   std::string scene = kScene;

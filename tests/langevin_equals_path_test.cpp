@@ -41,6 +41,7 @@ const std::map<std::string, Work>& works() {
       {"plan", {256, 200, 100000, 0.05}},
       {"lens", {256, 200, 100000, 0.05}},
       {"sun_pane", {300, 200, 100000, 0.05}},
+      {"pool_caustic", {300, 200, 100000, 0.05}},
       {"lamp_in_glass", {750, 200, 200000, 0.12}}};
   return kWorks;
 }
@@ -93,6 +94,11 @@ const std::map<std::string, Way>& ways() {
       {"splitting",
        {.mode = Mode::Splitting,
         .splitting = {.all = true, .levels = std::nullopt, .steps = std::nullopt}}},
+      {"low_threshold",
+       {.mode = Mode::Splitting,
+        .phase_space = PhaseSpace::Bidirectional,
+        .redistribution = {.threshold = 0.25, .mutations_per_sample = 16},
+        .splitting = {.all = true, .levels = std::nullopt, .steps = std::nullopt}}},
       {"two_levels",
        {.mode = Mode::Splitting,
         .drift = Drift::None,
@@ -111,8 +117,8 @@ const std::map<std::string, Way>& ways() {
 }
 
 /// With a sun so wide that path tracing finds it.
-LoadedScene sun_pane_in_haze() {
-  LoadedScene loaded = load_small("sun_pane");
+LoadedScene load_in_haze(const std::string& name) {
+  LoadedScene loaded = load_small(name);
   const auto& sky = std::get<EnvironmentMap>(loaded.scene.emitters()[*loaded.scene.environment()]);
   loaded.scene = loaded.scene.with_emitters({sky.blurred(0.08)});
   return loaded;
@@ -125,7 +131,7 @@ LoadedScene load_scene_of(const std::string& name) {
   if (name == "coated") return {test::coated(false), 5, {}, {}};
   if (name == "plan") return {test::plan(false), 5, {}, {}};
   if (name == "lens") return {test::lens(false), 5, {}, {}};
-  if (name == "sun_pane") return sun_pane_in_haze();
+  if (name == "sun_pane" || name == "pool_caustic") return load_in_haze(name);
   if (name == "lamp_in_glass") return load_small(name, {{"filament", "0.1"}});
   if (name == "ring_caustic") return load_small(name, {{"alpha", "0.2"}});
   return load_small(name);
@@ -133,7 +139,7 @@ LoadedScene load_scene_of(const std::string& name) {
 
 /// Whether particles are to carry something.
 bool has_small_emitter(const std::string& scene) {
-  return scene == "sun_pane" || scene == "lamp_in_glass";
+  return scene == "sun_pane" || scene == "pool_caustic" || scene == "lamp_in_glass";
 }
 
 /// Path-traced tiles of a scene, rendered once for all ways.
@@ -210,7 +216,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"limelight", "diagonal"}, Case{"limelight", "half_perturbed"},
                     Case{"coated", "gradient"}, Case{"coated", "redistribution_both_ends"},
                     Case{"sun_pane", "high_threshold"}, Case{"lamp_in_glass", "two_levels"},
-                    Case{"plan", "both_ends"}, Case{"lens", "redistribution"}),
+                    Case{"pool_caustic", "low_threshold"}, Case{"plan", "both_ends"},
+                    Case{"lens", "redistribution"}),
     name_of);
 
 /// All of them, but for an island of glass_caustic, the lamp's reflection, that one strategy alone

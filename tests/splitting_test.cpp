@@ -12,6 +12,7 @@
 #include "family_tiles.h"
 #include "lobe_sequence.h"
 #include "softened_bsdf.h"
+#include "support/scene_directory.h"
 #include "support/test_scenes.h"
 #include "support/tiles.h"
 #include "tempered_scenes.h"
@@ -147,13 +148,13 @@ std::vector<PathSampler::Sample> paths_to_lamp(const LoadedScene& loaded, std::s
 
 /// A path of the scene is one of all levels, where nothing stands in its way that does not in the
 /// scene, and nowhere far darker.
-TEST(TemperedScenes, LampsShineWhereverTheSceneIsLit) {
-  const LoadedScene loaded = wide_lamp();
-  const TemperedScenes levels(loaded.scene, 4);
-  for (const PathSampler::Sample& path : paths_to_lamp(loaded, 200)) {
+void expect_lit_at_all_levels(const Scene& scene, const std::vector<PathSampler::Sample>& paths) {
+  const TemperedScenes levels(scene, 4);
+  ASSERT_EQ(levels.top(), 4);
+  for (const PathSampler::Sample& path : paths) {
     const auto sharp = levels.at_level_0(path.topology, path.coordinates);
     ASSERT_TRUE(sharp && levels.carry(*sharp));
-    double before = contribution(loaded.scene, *sharp, path.coordinates).log_target;
+    double before = contribution(scene, *sharp, path.coordinates).log_target;
     for (int k = 1; k <= levels.top(); ++k) {
       PathTopology traced;
       ASSERT_EQ(trace(levels[k], path.topology, path.coordinates, traced), TraceStatus::Ok);
@@ -162,6 +163,11 @@ TEST(TemperedScenes, LampsShineWhereverTheSceneIsLit) {
       before = here;
     }
   }
+}
+
+TEST(TemperedScenes, LampsShineWhereverTheSceneIsLit) {
+  const LoadedScene loaded = wide_lamp();
+  expect_lit_at_all_levels(loaded.scene, paths_to_lamp(loaded, 200));
 }
 
 /// Jets, derivatives by hand and differences agree at all levels; how many were compared.
@@ -184,6 +190,37 @@ int check_derivatives(const Scene& scene, int count,
 TEST(TemperedScenes, DerivativesFollowBlurredLamps) {
   const LoadedScene loaded = wide_lamp();
   EXPECT_GT(check_derivatives(loaded.scene, 3, paths_to_lamp(loaded, 60)), 1000);
+}
+
+/// A lamp of a shape and radiance in a globe of glass, on a floor.
+LoadedScene globe_with(const std::string& shape, const std::string& radiance) {
+  const SceneDirectory directory;
+  const std::string place =
+      R"(<transform name="toWorld"><scale value="0.1"/><rotate x="1" y="1" angle="145"/>)"
+      R"(<translate z="3"/></transform>)";
+  return directory.load(with_sensor(
+      R"(<integrator type="path"><integer name="maxDepth" value="5"/></integrator>)"
+      R"(<shape type="rectangle"><transform name="toWorld"><scale value="4"/>)"
+      R"(<rotate x="1" angle="-90"/><translate y="-0.6" z="3"/></transform></shape>)"
+      R"(<shape type="sphere"><point name="center" x="0" y="0" z="3"/><float name="radius" value="0.4"/>)"
+      R"(<bsdf type="dielectric"/></shape><shape type=")" +
+      shape + "\">" + place + R"(<emitter type="area">)" + radiance + "</emitter></shape>"));
+}
+
+/// Blurred lamps know no shape but their extent, and the colour that a path meets on the lamp.
+TEST(TemperedScenes, LampsOfAnyShapeShineWhereverTheSceneIsLit) {
+  const std::string even = R"(<spectrum name="radiance" value="50"/>)";
+  const std::string textured =
+      R"(<texture name="radiance" type="checkerboard"><rgb name="color0" value="90, 20, 5"/>)"
+      R"(<rgb name="color1" value="10, 30, 70"/></texture>)";
+  const std::pair<std::string, std::string> lamps[] = {
+      {"disk", even}, {"cylinder", even}, {"cube", even}, {"rectangle", textured}};
+  for (const auto& [shape, radiance] : lamps) {
+    SCOPED_TRACE(shape);
+    const LoadedScene loaded = globe_with(shape, radiance);
+    expect_lit_at_all_levels(loaded.scene, paths_to_lamp(loaded, 60));
+    EXPECT_GT(check_derivatives(loaded.scene, 3, paths_to_lamp(loaded, 10)), 100);
+  }
 }
 
 /// Paths with narrow lobes, with coordinates from both ends.

@@ -295,11 +295,9 @@ class BlurredAreaEmitter {
   };
   template <Scalar T>
   Approach<T> approach(const Ray<T>& ray) const {
-    using S = Stripped<T>;
     const Vec3<T> u = principal(Vec3<T>(ray.origin - constant<T>(lamp_.center)));
-    const Vec3<S> at{strip(u.x()), strip(u.y()), strip(u.z())};
-    const Vec3<S> m = variances(dot(at, at));
-    return {nearest(u, principal(ray.direction), m), m};
+    const Vec3<T> m = variances(dot(u, u));
+    return {nearest(u, principal(ray.direction), m), {strip(m.x()), strip(m.y()), strip(m.z())}};
   }
   /// Differentials of that y, along the world's axes: dy = du + t dv + v dt with dt = t_u.du +
   /// t_v.dv.
@@ -326,8 +324,8 @@ class BlurredAreaEmitter {
     return {blur + core_.x(), blur + core_.y(), blur + core_.z()};
   }
   /// y = u + t v
-  template <Scalar T, Scalar M>
-  static Vec3<T> nearest(const Vec3<T>& u, const Vec3<T>& v, const Vec3<M>& m) {
+  template <Scalar T>
+  static Vec3<T> nearest(const Vec3<T>& u, const Vec3<T>& v, const Vec3<T>& m) {
     const T along = u.x() * v.x() / m.x() + u.y() * v.y() / m.y() + u.z() * v.z() / m.z();
     if (value(along) >= 0.0) return u;
     const T square = sqr(v.x()) / m.x() + sqr(v.y()) / m.y() + sqr(v.z()) / m.z();

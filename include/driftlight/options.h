@@ -106,6 +106,9 @@ struct SplittingOptions {
   /// Steps of a particle at each level; none: 4, or 16 where narrow lobes are softened, in which a
   /// particle has to find its way.
   std::optional<int> steps;
+  /// KernelOptions::scale of those steps over that of the others. They are not to find a target but
+  /// to cross it: the lobe of a blurred emitter, which at the next level is half as wide.
+  double scale = 3;
   /// KernelOptions::trust of all steps of particles. A family that cannot move in a lobe grows or
   /// dies as a whole from level to level; to move across lobes matters more than far over the film.
   double trust = 0.05;
