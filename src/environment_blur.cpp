@@ -17,17 +17,24 @@ constexpr int kLeastHeight = 8;
 
 /// Rows of texels by the angle theta of their centres from the pole.
 struct Rows {
-  explicit Rows(const Bitmap& bitmap) : height(bitmap.height) {}
+  explicit Rows(const Bitmap& bitmap) : height(bitmap.height) {
+    const Eigen::ArrayXd thetas =
+        (Eigen::ArrayXd::LinSpaced(height, 0.0, height - 1.0) + 0.5) * (kPi / height);
+    cosine = thetas.cos();
+    sine = thetas.sin();
+  }
 
   double theta(int row) const { return kPi * (row + 0.5) / height; }
   /// Area of a row of the unit sphere, up to a common factor.
-  double area(int row) const { return std::sin(theta(row)); }
+  double area(int row) const { return sine[row]; }
   /// The row that holds the angle.
   int at(double angle) const {
     return std::clamp(static_cast<int>(std::floor(angle * kInvPi * height)), 0, height - 1);
   }
 
   int height;
+  Eigen::ArrayXd cosine;
+  Eigen::ArrayXd sine;
 };
 
 /// Cosines and sines of the angles phi of the columns, twice around, so that a stretch of columns
@@ -83,8 +90,8 @@ class Blur {
     Eigen::ArrayXd w(columns_.width);
     for (int y = rows_.at(theta - reach_); y <= rows_.at(theta + reach_); ++y) {
       // cos gamma = along + across cos(delta phi)
-      const double along = std::cos(theta) * std::cos(rows_.theta(y));
-      const double across = std::sin(theta) * std::sin(rows_.theta(y));
+      const double along = to_rows_.cosine[row] * rows_.cosine[y];
+      const double across = to_rows_.sine[row] * rows_.sine[y];
       const double least = (least_ - along) / across;
       if (least >= 1.0) continue;
       const double widest = least > -1.0 ? std::acos(least) : kPi;
@@ -95,8 +102,9 @@ class Blur {
           static_cast<int>(std::ceil(2.0 * widest / columns_.per_column)) + 2, columns_.width);
       w.head(count) =
           (1.0 - inverse_ +
-           inverse_ * (along + across * std::cos(phi) * columns_.cosine.segment(first, count) +
-                       across * std::sin(phi) * columns_.sine.segment(first, count)))
+           inverse_ * (along +
+                       across * to_columns_.cosine[column] * columns_.cosine.segment(first, count) +
+                       across * to_columns_.sine[column] * columns_.sine.segment(first, count)))
               .max(0.0)
               .cube();
       const double area = rows_.area(y);
