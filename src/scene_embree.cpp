@@ -133,16 +133,17 @@ RTCBounds to_bounds(const Eigen::AlignedBox3d& box) {
   return bounds;
 }
 
+/// Of indices Embree takes those of the mesh, which like user geometries outlives it here; vertices
+/// it reads in sixteens of bytes, beyond the last one.
 RTCGeometry embree_geometry(RTCDevice device, const TriangleMesh& mesh) {
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
                                                                RTC_FORMAT_FLOAT3, 3 * sizeof(float),
                                                                mesh.positions.size()));
   for (const auto& p : mesh.positions) vertices = std::copy_n(p.data(), 3, vertices);
-  auto* indices = static_cast<std::uint32_t*>(
-      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                              3 * sizeof(std::uint32_t), mesh.triangles.size()));
-  for (const auto& t : mesh.triangles) indices = std::copy_n(t.data(), 3, indices);
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                             mesh.triangles.data(), 0, sizeof mesh.triangles.front(),
+                             mesh.triangles.size());
   return geometry;
 }
 

@@ -116,18 +116,22 @@ VertexKey vertex_key(const TriangleMesh& mesh, std::uint32_t vertex) {
   return std::bit_cast<VertexKey>(values);
 }
 
-/// Hashes of vertices, in the upper half of each number, and their indices, in the lower, by
-/// buckets that fit into the cache.
-std::vector<std::vector<std::uint64_t>> hashed_vertices(const TriangleMesh& mesh) {
+struct HashedVertex {
+  std::uint32_t hash, index;
+};
+
+/// In the order of their indices, by buckets that fit into the cache.
+std::vector<std::vector<HashedVertex>> hashed_vertices(const TriangleMesh& mesh) {
   constexpr std::size_t kBucketSize = 4096;
   const auto count = static_cast<std::uint32_t>(mesh.positions.size());
   std::vector<std::uint32_t> hashes(count);
   tbb::parallel_for(std::uint32_t{0}, count, [&](std::uint32_t i) {
     hashes[i] = static_cast<std::uint32_t>(boost::hash_value(vertex_key(mesh, i)));
   });
-  std::vector<std::vector<std::uint64_t>> buckets(count / kBucketSize + 1);
+  std::vector<std::vector<HashedVertex>> buckets(count / kBucketSize + 1);
+  for (auto& bucket : buckets) bucket.reserve(kBucketSize + kBucketSize / 8);
   for (std::uint32_t i = 0; i < count; ++i)
-    buckets[hashes[i] % buckets.size()].push_back(std::uint64_t{hashes[i]} << 32U | i);
+    buckets[hashes[i] % buckets.size()].push_back({hashes[i], i});
   return buckets;
 }
 
@@ -135,20 +139,21 @@ std::vector<std::vector<std::uint64_t>> hashed_vertices(const TriangleMesh& mesh
 std::vector<std::uint32_t> first_equals(const TriangleMesh& mesh) {
   std::vector<std::uint32_t> result(mesh.positions.size());
   std::iota(result.begin(), result.end(), 0U);
-  auto buckets = hashed_vertices(mesh);
-  tbb::parallel_for_each(buckets, [&](std::vector<std::uint64_t>& bucket) {
-    std::sort(bucket.begin(), bucket.end());
-    std::vector<std::uint32_t> distinct;  // of those of the same hash
-    for (std::size_t i = 0; i < bucket.size(); ++i) {
-      if (i == 0 || bucket[i] >> 32U != bucket[i - 1] >> 32U) distinct.clear();
-      const auto vertex = static_cast<std::uint32_t>(bucket[i]);
-      const auto equal = std::find_if(distinct.begin(), distinct.end(), [&](std::uint32_t other) {
-        return vertex_key(mesh, other) == vertex_key(mesh, vertex);
-      });
-      if (equal == distinct.end())
-        distinct.push_back(vertex);
+  const auto buckets = hashed_vertices(mesh);
+  tbb::parallel_for_each(buckets, [&](const std::vector<HashedVertex>& bucket) {
+    // Distinct ones, each at its hash or the next free place.
+    std::vector<const HashedVertex*> table(std::bit_ceil(2 * bucket.size() + 1));
+    for (const HashedVertex& vertex : bucket) {
+      const auto equals = [&](const HashedVertex& other) {
+        return other.hash == vertex.hash &&
+               vertex_key(mesh, other.index) == vertex_key(mesh, vertex.index);
+      };
+      std::size_t at = vertex.hash / buckets.size() % table.size();
+      while (table[at] != nullptr && !equals(*table[at])) at = (at + 1) % table.size();
+      if (table[at] == nullptr)
+        table[at] = &vertex;
       else
-        result[vertex] = *equal;
+        result[vertex.index] = table[at]->index;
     }
   });
   return result;

@@ -3,6 +3,7 @@
 
 #include <tbb/parallel_pipeline.h>
 
+#include <array>
 #include <cstdint>
 #include <fstream>
 #include <istream>
@@ -17,21 +18,29 @@
 namespace driftlight {
 namespace {
 
-/// Whole lines, 64 KiB or somewhat more; none at the end.
-std::string read_lines(std::istream& stream) {
-  constexpr std::size_t kSize = std::size_t{1} << 16U;
-  std::string lines(kSize, '\0');
+/// Reads whole lines, 128 KiB or somewhat more; none at the end.
+void read_lines(std::istream& stream, std::string& lines) {
+  constexpr std::size_t kSize = std::size_t{1} << 17U;
+  lines.resize(kSize);
   stream.read(lines.data(), static_cast<std::streamsize>(lines.size()));
   lines.resize(static_cast<std::size_t>(stream.gcount()));
   std::string rest;
-  if (std::getline(stream, rest)) lines += rest + '\n';
-  return lines;
+  if (std::getline(stream, rest)) lines.append(rest).push_back('\n');
 }
 
 /// Makes meshes of pieces, in the order of the file.
 class ObjReader {
  public:
-  explicit ObjReader(const ObjOptions& options) : options_(options) {}
+  /// Of a file of so many bytes.
+  ObjReader(const ObjOptions& options, std::uintmax_t file_size) : options_(options) {
+    // A line is mostly longer. Memory that is reserved and not used costs nothing; what grows is
+    // touched twice.
+    const std::size_t lines = file_size / 32;
+    positions_.reserve(lines);
+    seen_.reserve(lines);
+    mesh_.positions.reserve(lines);
+    mesh_.triangles.reserve(lines);
+  }
 
   /// Throws LineError.
   void add(const ObjPiece& piece) {
@@ -41,8 +50,8 @@ class ObjReader {
       taken = statement.before;
       line_ = lines_ + statement.line;
       switch (statement.kind) {
-        case ObjPiece::Kind::Polygon:
-          add_polygon(&piece.corners[statement.first], statement.count);
+        case ObjPiece::Kind::Polygons:
+          add_polygons(&piece.corners[statement.first], statement);
           break;
         case ObjPiece::Kind::Group:
           start_group();
@@ -85,6 +94,7 @@ class ObjReader {
   void add_values(const ObjPiece& piece, const ObjPiece::Counts& from, const ObjPiece::Counts& to) {
     positions_.insert(positions_.end(), piece.positions.begin() + from.positions,
                       piece.positions.begin() + to.positions);
+    seen_.resize(positions_.size());
     normals_.insert(normals_.end(), piece.normals.begin() + from.normals,
                     piece.normals.begin() + to.normals);
     for (std::size_t i = from.uvs; i < to.uvs; ++i) {
@@ -93,6 +103,10 @@ class ObjReader {
     }
   }
 
+  void add_polygons(const ObjPiece::Corner* corners, const ObjPiece::Statement& polygons) {
+    for (std::uint32_t i = 0; i < polygons.count; ++i, ++line_)
+      add_polygon(corners + std::size_t{i} * polygons.corners, polygons.corners);
+  }
   /// A fan, as Mitsuba makes of polygons.
   void add_polygon(const ObjPiece::Corner* corners, std::size_t count) {
     const std::uint32_t first = vertex(corners[0]);
@@ -125,7 +139,6 @@ class ObjReader {
     Corner corner{index(indices.position, positions_, "vertex"), kNone, kNone};
     if (indices.normal != 0) corner.normal = index(indices.normal, normals_, "normal");
     if (indices.uv != 0) corner.uv = index(indices.uv, uvs_, "texture coordinate");
-    if (seen_.size() < positions_.size()) seen_.resize(positions_.size());
     Seen& seen = seen_[corner.position];
     const auto part = static_cast<std::uint32_t>(file_.parts.size() + 1);
     if (seen.part != part || seen.normal != corner.normal || seen.uv != corner.uv)
@@ -178,22 +191,35 @@ void skip_byte_order_mark(std::istream& stream) {
   if (start != kMark) stream.seekg(0);
 }
 
-/// Pieces are parsed side by side, some at a time, which bounds the memory.
-ObjFile read_pieces(std::istream& stream, const ObjOptions& options) {
-  constexpr std::size_t kAtATime = 16;
-  ObjReader reader(options);
+/// Some lines, and what they say.
+struct Portion {
+  std::string lines;
+  ObjPiece piece;
+};
+
+/// Portions are parsed side by side, some at a time, in the same memory over and over.
+ObjFile read_portions(std::istream& stream, std::uintmax_t file_size, const ObjOptions& options) {
+  constexpr std::size_t kAtATime = 8;
+  // All end in order: when one begins that which had its place has ended.
+  std::array<Portion, kAtATime> places;
+  std::size_t begun = 0;
+  ObjReader reader(options, file_size);
   skip_byte_order_mark(stream);
-  tbb::parallel_pipeline(
-      kAtATime,
-      tbb::make_filter<void, std::string>(tbb::filter_mode::serial_in_order,
-                                          [&](tbb::flow_control& control) {
-                                            std::string lines = read_lines(stream);
-                                            if (lines.empty()) control.stop();
-                                            return lines;
-                                          }) &
-          tbb::make_filter<std::string, ObjPiece>(tbb::filter_mode::parallel, &parse_obj) &
-          tbb::make_filter<ObjPiece, void>(tbb::filter_mode::serial_in_order,
-                                           [&](const ObjPiece& piece) { reader.add(piece); }));
+  const auto read = [&](tbb::flow_control& control) {
+    Portion& portion = places[begun++ % kAtATime];
+    read_lines(stream, portion.lines);
+    if (portion.lines.empty()) control.stop();
+    return &portion;
+  };
+  const auto parse = [](Portion* portion) {
+    parse_obj(portion->lines, portion->piece);
+    return portion;
+  };
+  const auto add = [&](const Portion* portion) { reader.add(portion->piece); };
+  using enum tbb::filter_mode;
+  tbb::parallel_pipeline(kAtATime, tbb::make_filter<void, Portion*>(serial_in_order, read) &
+                                       tbb::make_filter<Portion*, Portion*>(parallel, parse) &
+                                       tbb::make_filter<Portion*, void>(serial_in_order, add));
   return reader.take();
 }
 
@@ -204,7 +230,7 @@ ObjFile read_obj(const std::filesystem::path& file, const ObjOptions& options) {
   if (!stream || std::filesystem::is_directory(file))
     throw InputError("the mesh '" + file.string() + "' cannot be opened");
   try {
-    return read_pieces(stream, options);
+    return read_portions(stream, std::filesystem::file_size(file), options);
   } catch (const LineError& error) {
     std::ifstream again(file, std::ios::binary);
     const std::string text{std::istreambuf_iterator<char>(again), std::istreambuf_iterator<char>()};

@@ -251,21 +251,7 @@ class PlyReader {
       throw InputError("its faces lack the list 'vertex_indices'");
     for (const PlyProperty& property : element.properties)
       if (!is_polygon(property)) file_.unused.push_back("face " + property.name);
-    if (are_triangles(element)) {
-      file_.mesh.triangles.resize(element.count);
-      read_rows(element.count, row_size(element, 3), [&](PlyValues& values, std::uint64_t i) {
-        for (const PlyProperty& property : element.properties) {
-          if (!is_polygon(property)) {
-            skip(property, values);
-            continue;
-          }
-          values.next(*property.count_type);
-          for (std::uint32_t& index : file_.mesh.triangles[i])
-            index = read_index(property.type, values);
-        }
-      });
-      return;
-    }
+    if (const auto rows = triangle_rows(element)) return read_triangles(element.count, *rows);
     file_.mesh.triangles.reserve(element.count);
     for (std::uint64_t i = 0; i < element.count; ++i)
       for (const PlyProperty& property : element.properties) {
@@ -276,25 +262,47 @@ class PlyReader {
       }
   }
 
-  /// Whether the rows to come are binary, each with one list, of three corners.
-  bool are_triangles(const PlyElement& element) const {
+  /// Rows of one size each with a triangle.
+  struct TriangleRows {
+    std::size_t size;
+    std::size_t count;  ///< where in a row the number of corners is
+    PlyType count_type;
+    PlyType type;  ///< of an index
+  };
+
+  /// If the rows to come are binary, each with one list, of three corners.
+  std::optional<TriangleRows> triangle_rows(const PlyElement& element) const {
     const std::size_t size = row_size(element, 3);
-    if (values_.is_text() || element.count > values_.size() / size) return false;
+    if (values_.is_text() || element.count > values_.size() / size) return std::nullopt;
     std::size_t before = 0;
     const PlyProperty* list = nullptr;
     for (const PlyProperty& property : element.properties) {
-      if (property.count_type && (list != nullptr || !is_polygon(property))) return false;
+      if (property.count_type && (list != nullptr || !is_polygon(property))) return std::nullopt;
       if (property.count_type) list = &property;
       if (list == nullptr) before += size_of(property.type);
     }
-    return tbb::parallel_reduce(
+    const TriangleRows result{size, before, *list->count_type, list->type};
+    const bool are_triangles = tbb::parallel_reduce(
         tbb::blocked_range<std::uint64_t>(0, element.count, kRows), true,
         [&](const auto& rows, bool all) {
           for (std::uint64_t i = rows.begin(); all && i < rows.end(); ++i)
-            all = values_.after(i * size + before).next(*list->count_type) == 3.0;
+            all = values_.after(i * size + before).next(result.count_type) == 3.0;
           return all;
         },
         std::logical_and<>());
+    return are_triangles ? std::optional(result) : std::nullopt;
+  }
+
+  void read_triangles(std::uint64_t count, const TriangleRows& rows) {
+    file_.mesh.triangles.resize(count);
+    const std::size_t corners = rows.count + size_of(rows.count_type);
+    tbb::parallel_for(tbb::blocked_range<std::uint64_t>(0, count, kRows), [&](const auto& range) {
+      for (std::uint64_t i = range.begin(); i < range.end(); ++i) {
+        PlyValues values = values_.after(i * rows.size + corners);
+        for (std::uint32_t& index : file_.mesh.triangles[i]) index = read_index(rows.type, values);
+      }
+    });
+    values_ = values_.after(count * rows.size);
   }
 
   /// A fan around the first corner.

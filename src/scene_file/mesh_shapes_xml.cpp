@@ -49,15 +49,17 @@ void note_missing_normals(Properties& properties, std::size_t count, LoadContext
 }
 
 /// Likewise of a mesh with colours, which splitting at creases loses.
-ShapePart finish_colored(Properties& properties, ColoredMesh&& file, Mirrored mirrored,
-                         LoadContext& context) {
+std::vector<ShapePart> finish_colored(Properties& properties, ColoredMesh&& file, Mirrored mirrored,
+                                      LoadContext& context) {
   note_missing_normals(properties, finish_mesh(properties, file.mesh, mirrored, file.face_normals),
                        context);
   if (properties.has("maxSmoothAngle") && !file.colors.empty()) {
     context.notice(properties.element(), "'maxSmoothAngle' loses the colours of the vertices");
     file.colors.clear();
   }
-  return {std::move(file.mesh), nullptr, std::move(file.colors)};
+  std::vector<ShapePart> result;  // a list of one in braces would copy the mesh
+  result.push_back({std::move(file.mesh), nullptr, std::move(file.colors)});
+  return result;
 }
 
 /// A file named in an obj file, beside it or among those of the scene.
@@ -173,7 +175,7 @@ std::vector<ShapePart> read_ply_shape(Properties& properties, LoadContext& conte
     for (Eigen::Vector3f& color : file.colors)
       color = color.unaryExpr(
           [](float c) { return static_cast<float>(srgb_to_linear(static_cast<double>(c))); });
-  return {finish_colored(properties, std::move(file), Mirrored::TurnsInsideOut, context)};
+  return finish_colored(properties, std::move(file), Mirrored::TurnsInsideOut, context);
 }
 
 std::vector<ShapePart> read_serialized_shape(Properties& properties, LoadContext& context,
@@ -183,7 +185,7 @@ std::vector<ShapePart> read_serialized_shape(Properties& properties, LoadContext
   ColoredMesh file = with_location(properties.element(), [&] {
     return read_serialized(properties.element().find_file(name), index);
   });
-  return {finish_colored(properties, std::move(file), Mirrored::KeepsOutside, context)};
+  return finish_colored(properties, std::move(file), Mirrored::KeepsOutside, context);
 }
 
 }  // namespace driftlight

@@ -24,38 +24,50 @@ constexpr std::array<std::string_view, 41> kOtherStatements{
     "trace_obj", "cdc",      "cdp",  "res",    "fo"};
 
 bool is_blank(char c) { return c == ' ' || c == '\t'; }
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_end_of_line(char c) { return c == '\n' || c == '\r' || c == '\0'; }
 
 /// Goes through the text once, from character to character. Behind the last one is a zero.
 class ObjText {
  public:
-  explicit ObjText(const std::string& text) : at_(text.c_str()), end_(text.c_str() + text.size()) {}
+  ObjText(const std::string& text, ObjPiece& piece)
+      : at_(text.c_str()), end_(text.c_str() + text.size()), piece_(piece) {
+    piece_.clear();
+  }
 
-  ObjPiece parse() {
+  void parse() {
     while (at_ != end_ && !piece_.problem) {
       ++piece_.line_count;
       parse_line();
       go_to_next_line();
     }
-    return std::move(piece_);
   }
 
  private:
   void parse_line() {
     skip_blanks();
     if (is_end_of_line(*at_) || *at_ == '#') return check_end();
-    const std::string_view statement = word();
-    at_ += statement.size();
-    if (statement == "f")
+    if (take("f"))
       parse_face();
-    else if (statement == "v")
-      parse_vector(piece_.positions, statement);
-    else if (statement == "vn")
-      parse_vector(piece_.normals, statement);
-    else if (statement == "vt")
+    else if (take("v"))
+      parse_vector(piece_.positions, "v");
+    else if (take("vn"))
+      parse_vector(piece_.normals, "vn");
+    else if (take("vt"))
       parse_uv();
     else
-      parse_other(statement);
+      parse_other();
+  }
+
+  /// Goes on behind the word, if it is the next one.
+  template <std::size_t N>
+  bool take(const char (&word)[N]) {
+    constexpr std::size_t kLength = N - 1;
+    for (std::size_t i = 0; i < kLength; ++i)
+      if (at_[i] != word[i]) return false;
+    if (!is_end_of_word(at_[kLength])) return false;
+    at_ += kLength;
+    return true;
   }
 
   void parse_vector(std::vector<Eigen::Vector3f>& into, std::string_view statement) {
@@ -90,7 +102,7 @@ class ObjText {
   /// Such as nan, which from_chars takes for a number.
   static bool is_a_word(const char* first) {
     const char c = *first == '-' ? first[1] : *first;
-    return c != '.' && (c < '0' || c > '9');
+    return c != '.' && !is_digit(c);
   }
   /// A number that is out of range since it is nearly zero, and then is zero.
   static bool is_tiny(const std::string& number) {
@@ -110,11 +122,21 @@ class ObjText {
       }
       piece_.corners.push_back(corner);
     }
-    const std::uint32_t count = static_cast<std::uint32_t>(piece_.corners.size()) - first;
-    if (count < 3)
+    const std::uint32_t corners = static_cast<std::uint32_t>(piece_.corners.size()) - first;
+    if (corners < 3)
       fail("a face has fewer than three corners");
+    else if (follows_polygons(corners))
+      ++piece_.statements.back().count;
     else
-      add(ObjPiece::Kind::Polygon, first, count);
+      add(ObjPiece::Kind::Polygons, first, corners);
+  }
+
+  /// Whether the line before was one of the last statement, of as many corners each.
+  bool follows_polygons(std::uint32_t corners) const {
+    if (piece_.statements.empty()) return false;
+    const ObjPiece::Statement& last = piece_.statements.back();
+    return last.kind == ObjPiece::Kind::Polygons && last.corners == corners &&
+           last.line + static_cast<int>(last.count) == piece_.line_count;
   }
 
   bool parse_corner(ObjPiece::Corner& corner) {
@@ -129,21 +151,29 @@ class ObjText {
     }
     return is_end_of_word(*at_);
   }
+  /// Most of a large file is indices: short ones without from_chars, which takes twice the time.
   bool parse_index(int& index) {
-    const auto [stop, error] = std::from_chars(*at_ == '+' ? at_ + 1 : at_, end_, index);
-    at_ = stop;
-    return error == std::errc();
+    constexpr std::ptrdiff_t kShort = 9;
+    const char* stop = at_;
+    int value = 0;
+    while (is_digit(*stop) && stop - at_ < kShort) value = 10 * value + (*stop++ - '0');
+    if (stop != at_ && !is_digit(*stop)) {
+      index = value;
+      at_ = stop;
+      return true;
+    }
+    const auto result = std::from_chars(*at_ == '+' ? at_ + 1 : at_, end_, index);
+    at_ = result.ptr;
+    return result.ec == std::errc();
   }
 
-  void parse_other(std::string_view statement) {
-    if (statement == "g")
-      add_name(ObjPiece::Kind::Group);
-    else if (statement == "usemtl")
-      add_name(ObjPiece::Kind::Material);
-    else if (statement == "mtllib")
-      add_name(ObjPiece::Kind::Library);
-    else if (std::find(kOtherStatements.begin(), kOtherStatements.end(), statement) ==
-             kOtherStatements.end())
+  void parse_other() {
+    if (take("g")) return add_name(ObjPiece::Kind::Group);
+    if (take("usemtl")) return add_name(ObjPiece::Kind::Material);
+    if (take("mtllib")) return add_name(ObjPiece::Kind::Library);
+    const std::string_view statement = word();
+    if (std::find(kOtherStatements.begin(), kOtherStatements.end(), statement) ==
+        kOtherStatements.end())
       fail(unknown(statement));
   }
   static std::string unknown(std::string_view statement) {
@@ -158,16 +188,16 @@ class ObjText {
     const char* last = at_;
     while (!is_end_of_line(*last)) ++last;
     while (last > at_ && is_blank(last[-1])) --last;
-    add(kind, static_cast<std::uint32_t>(piece_.names.size()), 0);
+    add(kind, static_cast<std::uint32_t>(piece_.names.size()));
     piece_.names.emplace_back(at_, last);
   }
-  void add(ObjPiece::Kind kind, std::uint32_t first, std::uint32_t count) {
+  void add(ObjPiece::Kind kind, std::uint32_t first, std::uint32_t corners = 0) {
     const auto size = [](const auto& values) { return static_cast<std::uint32_t>(values.size()); };
     piece_.statements.push_back({kind,
                                  piece_.line_count,
                                  {size(piece_.positions), size(piece_.normals), size(piece_.uvs)},
                                  first,
-                                 count});
+                                 corners});
   }
 
   bool fail(const std::string& message) {
@@ -202,11 +232,22 @@ class ObjText {
 
   const char* at_;
   const char* end_;
-  ObjPiece piece_;
+  ObjPiece& piece_;
 };
 
 }  // namespace
 
-ObjPiece parse_obj(const std::string& lines) { return ObjText(lines).parse(); }
+void ObjPiece::clear() {
+  positions.clear();
+  normals.clear();
+  uvs.clear();
+  corners.clear();
+  names.clear();
+  statements.clear();
+  line_count = 0;
+  problem.reset();
+}
+
+void parse_obj(const std::string& lines, ObjPiece& piece) { ObjText(lines, piece).parse(); }
 
 }  // namespace driftlight
