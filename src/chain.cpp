@@ -10,11 +10,10 @@ Chain::Chain(const Scene& scene, const PathSampler& sampler, const LangevinOptio
     : scene_(scene),
       sampler_(sampler),
       large_step_probability_(options.large_step_probability.value_or(0.1)),
-      small_step_(scene, options.kernel),
+      small_step_(scene, options.kernel, options.delayed_rejection.scale()),
       film_(film),
       rng_(rng),
       layers_(layers) {
-  if (options.delayed_rejection) second_scale_ = options.second_scale;
   current().topology = start.topology;
   current().coordinates = start.coordinates;
   current().contribution = contribution(scene, start.topology, start.coordinates);
@@ -23,7 +22,7 @@ Chain::Chain(const Scene& scene, const PathSampler& sampler, const LangevinOptio
 void Chain::run(std::uint64_t mutations) {
   for (std::uint64_t i = 0; i < mutations; ++i) {
     const bool large = rng_.uniform() < large_step_probability_;
-    if (!large && second_scale_) {
+    if (!large && small_step_.delays_rejection()) {
       take_delayed_step();
       continue;
     }
@@ -99,7 +98,7 @@ void Chain::take_delayed_step() {
     return;
   }
   if (acceptance > 0.0) ++statistics_.rejections.hastings;
-  const double second = current().finite ? propose_second(acceptance, valid) : 0.0;
+  const double second = propose_second(acceptance, valid);
   if (layers_ != nullptr) small_step_.record(current(), second, *layers_);
   const bool moved = resolve(second, second_);
   if (second > 0.0 && !moved) ++statistics_.rejections.hastings;
@@ -111,7 +110,7 @@ double Chain::propose_second(double first_acceptance, bool valid) {
   ChainState& to = states_[second_];
   Rejections& rejections = statistics_.rejections;
   ++statistics_.second_step.proposed;
-  if (!small_step_.propose_again(from, to, *second_scale_, rng_, rejections)) return 0.0;
+  if (!small_step_.propose_again(from, to, rng_, rejections)) return 0.0;
   const auto densities = small_step_.log_densities(from, to, rejections);
   if (!densities) return 0.0;
   const double log_target = to.contribution.log_target;

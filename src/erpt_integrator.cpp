@@ -5,15 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 #include <vector>
 
+#include "chain_counts.h"
 #include "chain_schedule.h"
 #include "direct_pass.h"
 #include "driftlight/error.h"
 #include "driftlight/film.h"
 #include "driftlight/small_step.h"
-#include "exact_sum.h"
 #include "mutation_loop.h"
 #include "pass_loop.h"
 #include "path_mutation.h"
@@ -49,20 +48,7 @@ struct Energy {
     return {scene, unguided, MisHeuristic::Balance, options.max_depth};
   }
 
-  void count(const LangevinStatistics& more) {
-    accepted_.add(more.small_step.accepted);
-    const std::lock_guard lock(mutex_);
-    statistics_.small_step.proposed += more.small_step.proposed;
-    statistics_.rejections += more.rejections;
-    statistics_.starts += more.starts;
-  }
-  /// Of the chains.
-  LangevinStatistics statistics() const {
-    LangevinStatistics result = statistics_;
-    result.small_step.accepted = accepted_.value();
-    result.mutations = result.small_step.proposed;
-    return result;
-  }
+  ChainCounts counts;  ///< of the chains
 
  private:
   /// Adds up what a sample finds for the chains.
@@ -96,10 +82,6 @@ struct Energy {
     for (const double sum : sums) total += sum;
     return total / static_cast<double>(count);
   }
-
-  ExactSum accepted_;
-  std::mutex mutex_;
-  LangevinStatistics statistics_;
 };
 
 /// One bidirectional sample, and the chains that start from the paths that it finds.
@@ -111,9 +93,11 @@ class EnergySampler {
     starts_.clear();
     Sink sink{*this, film, film_sink};
     tracer_.sample(film, rng, sink);
-    LangevinStatistics statistics;
-    for (Start& start : starts_) redistribute(start, rng, statistics);
-    if (!starts_.empty()) energy_.count(statistics);
+    ChainFigures figures;
+    std::uint64_t starts = 0;
+    for (Start& start : starts_)
+      if (redistribute(start, rng, figures)) ++starts;
+    if (!starts_.empty()) energy_.counts.add(figures, starts);
   }
 
  private:
@@ -146,39 +130,33 @@ class EnergySampler {
     return false;
   }
 
-  /// By chains of mutations that deposit e_d each.
-  void redistribute(Start& start, Rng& rng, LangevinStatistics& statistics) {
+  /// By chains of mutations that deposit e_d each; false if it starts none.
+  bool redistribute(Start& start, Rng& rng, ChainFigures& figures) {
     const auto [chains, mutations, deposit] =
         schedule_chains(start.value, energy_.deposit, energy_.options.chain_length, rng);
-    if (chains > 0.0) ++statistics.starts;
     for (double i = 0; i < chains; ++i)
-      run(start.path, static_cast<std::uint64_t>(mutations), deposit / energy_.unit, rng,
-          statistics);
+      run(start.path, static_cast<std::uint64_t>(mutations), deposit / energy_.unit, rng, figures);
+    return chains > 0.0;
   }
 
   void run(VertexPath& start, std::uint64_t mutations, double weight, Rng& rng,
-           LangevinStatistics& statistics) {
-    const auto propose = [&](const VertexPath& x, VertexPath& y) {
-      MutationDensities densities;
-      ++statistics.small_step.proposed;
-      if (!succeeded(energy_.mutation.perturb(x, y, densities, rng), statistics.rejections))
-        return 0.0;
-      const double acceptance =
-          acceptance_of(x.contribution().log_target, y.contribution().log_target, densities,
-                        statistics.rejections);
-      statistics.small_step.accepted += acceptance;
-      return acceptance;
+           ChainFigures& figures) {
+    const DelayedRejection& delayed_rejection = energy_.options.delayed_rejection;
+    const auto propose = [&](const VertexPath& x, VertexPath& y, MutationStage stage, Rng& numbers,
+                             Rejections& rejections) {
+      const double size = stage == MutationStage::Second ? delayed_rejection.second_scale : 1.0;
+      return energy_.mutation.propose(x, y, size, numbers, rejections);
     };
-    statistics.rejections.hastings += run_mutations(
-        start, paths_, mutations, rng, propose, [&](const VertexPath& at, double share) {
-          const Contribution& value = at.contribution();
-          energy_.film.splat(value.film, value.color, share * weight);
-        });
+    run_mutations(start, paths_, {mutations, delayed_rejection.on}, rng, figures, propose,
+                  [&](const VertexPath& at, double share) {
+                    const Contribution& value = at.contribution();
+                    energy_.film.splat(value.film, value.color, share * weight);
+                  });
   }
 
   Energy& energy_;
   BidirectionalTracer tracer_;
-  std::array<VertexPath, 2> paths_;
+  std::array<VertexPath, 3> paths_;
   std::vector<Start> starts_;
 };
 
@@ -208,7 +186,7 @@ LangevinResult render_erpt(const Scene& scene, const ErptOptions& options,
           return image;
         });
     result.image = std::move(samples.image);
-    result.statistics = energy.statistics();
+    result.statistics = energy.counts.statistics();
     result.statistics.b = mean_luminance(result.image);
     if (!(result.statistics.b > 0.0) && !samples.stopped)
       throw InputError("no path from the sensor to an emitter carries light");

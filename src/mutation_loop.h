@@ -1,40 +1,117 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <utility>
 
 #include "driftlight/random.h"
+#include "driftlight/render.h"
 
 namespace driftlight {
 
-/// Runs a chain from `start`, which it only looks at, in the memory of two more states. A mutation
-/// is propose(x, y): it fills y and returns the probability of acceptance. Reports
-/// visit(state, weight): of each mutation both states, with weights 1 - a and a; what a state
-/// gathers while the chain stays there at once. Returns how many proposals that might have been
-/// accepted were not.
+/// What chains of mutations did.
+struct ChainFigures {
+  KernelStatistics small_step;
+  KernelStatistics second_step;
+  Rejections rejections;
+
+  ChainFigures& operator+=(const ChainFigures& other) {
+    small_step += other.small_step;
+    second_step += other.second_step;
+    rejections += other.rejections;
+    return *this;
+  }
+};
+
+/// Delayed rejection of any kernel by common random numbers. Let y(x, u) be the first proposal from
+/// x by the random numbers u, which do not depend on x, and a(x, u) the probability of accepting
+/// it. Where it is refused, a second one z is drawn from T(z | x), whatever u was, and accepted
+/// with probability
+///   min(1, pi(z) T(x | z) (1 - a(z, u)) / (pi(x) T(z | x) (1 - a(x, u)))):
+/// for each u the flows from x to z and from z to x are the same. Where y is x moved by u the ghost
+/// y(z, u) is that of Green and Mira 2001; otherwise it needs neither a density nor an inverse.
+enum class MutationStage : std::uint8_t {
+  First,   ///< y(x, u)
+  Second,  ///< z
+  Ghost,   ///< y(z, u)
+};
+
+/// The acceptance above: `ratio` is that of pi and T, the others are a(x, u) and a(z, u).
+inline double second_acceptance(double ratio, double first, double ghost) {
+  return ghost < 1.0 ? std::min(1.0, ratio * ((1.0 - ghost) / (1.0 - first))) : 0.0;
+}
+
+/// How a chain runs.
+struct MutationRun {
+  std::uint64_t mutations;
+  bool delayed_rejection;
+};
+
+/// Runs a chain from `start`, which it only looks at, in the memory of three more states. A
+/// mutation is propose(x, y, stage, rng, rejections): it fills y and returns pi(y) T(x | y) /
+/// (pi(x) T(y | x)), 0 where there is no such y, which it counts. Reports visit(state, weight): of
+/// each mutation both states, with weights 1 - a and a; what a state gathers while the chain stays
+/// there at once. Returns the last state.
 template <class State, class Propose, class Visit>
-std::uint64_t run_mutations(State& start, std::array<State, 2>& memory, std::uint64_t mutations,
-                            Rng& rng, const Propose& propose, const Visit& visit) {
+State& run_mutations(State& start, std::array<State, 3>& memory, const MutationRun& run, Rng& rng,
+                     ChainFigures& figures, const Propose& propose, const Visit& visit) {
   State* from = &start;
-  State* to = memory.data();
+  State* to = &memory[0];
+  State* second = &memory[1];
   double gathered = 0;
-  std::uint64_t refused = 0;
-  for (std::uint64_t i = 0; i < mutations; ++i) {
-    const double acceptance = propose(*from, *to);
+  const auto move = [&](State*& next, double weight) {
+    if (gathered > 0.0) visit(*from, gathered);
+    std::swap(from, next);
+    if (next == &start) next = &memory[2];
+    gathered = weight;
+  };
+  /// With the proposal's probability of acceptance, or else the state stays.
+  const auto settle = [&](State*& next, double acceptance) {
     gathered += 1.0 - acceptance;
     if (rng.uniform() < acceptance) {
-      if (gathered > 0.0) visit(*from, gathered);
-      from = to;
-      to = &memory[to == memory.data() ? 1 : 0];
-      gathered = acceptance;
+      move(next, acceptance);
     } else if (acceptance > 0.0) {
-      visit(*to, acceptance);
-      ++refused;
+      visit(*next, acceptance);
+      ++figures.rejections.hastings;
+    }
+  };
+  const auto propose_first = [&](Rng& numbers) {
+    const double acceptance =
+        std::min(1.0, propose(*from, *to, MutationStage::First, numbers, figures.rejections));
+    ++figures.small_step.proposed;
+    figures.small_step.accepted += acceptance;
+    return acceptance;
+  };
+  const auto propose_second = [&](double first, Rng& numbers) {
+    const double ratio = propose(*from, *second, MutationStage::Second, rng, figures.rejections);
+    Rejections of_ghost;
+    const double ghost =
+        ratio > 0.0 ? std::min(1.0, propose(*second, *to, MutationStage::Ghost, numbers, of_ghost))
+                    : 0.0;
+    const double acceptance = second_acceptance(ratio, first, ghost);
+    ++figures.second_step.proposed;
+    figures.second_step.accepted += acceptance;
+    return acceptance;
+  };
+  for (std::uint64_t i = 0; i < run.mutations; ++i) {
+    if (!run.delayed_rejection) {
+      settle(to, propose_first(rng));
+      continue;
+    }
+    Rng numbers = rng.fork();
+    Rng again = numbers;
+    const double first = propose_first(numbers);
+    if (rng.uniform() < first) {
+      move(to, 1.0);
+    } else {
+      if (first > 0.0) ++figures.rejections.hastings;
+      settle(second, propose_second(first, again));
     }
   }
   if (gathered > 0.0) visit(*from, gathered);
-  return refused;
+  return *from;
 }
 
 }  // namespace driftlight

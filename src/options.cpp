@@ -139,31 +139,29 @@ std::vector<OptionEntry> only_with(std::string_view text, const std::function<bo
   return entries;
 }
 
-/// Of a second step after one that is rejected; `scale` is the help of its size.
-std::vector<OptionEntry> delayed_rejection_entries(bool& delayed_rejection, double& second_scale,
-                                                   const Range<double>& range,
-                                                   std::string_view scale) {
+/// `scale` is the help of the second step's size.
+std::vector<OptionEntry> delayed_rejection_entries(
+    DelayedRejection& options,
+    std::string_view scale = "scale of that second step, over that of the first") {
   std::vector<OptionEntry> result{
-      choice("delayed_rejection", delayed_rejection, std::array<std::string_view, 2>{"off", "on"},
+      choice("delayed_rejection", options.on, std::array<std::string_view, 2>{"off", "on"},
              "a rejected small step is followed by a second, smaller one")};
-  append(result,
-         only_with("delayed_rejection=on", [&delayed_rejection] { return delayed_rejection; },
-                   {number("second_scale", second_scale, range, scale)}));
+  append(result, only_with("delayed_rejection=on", [&options] { return options.on; },
+                           {number("second_scale", options.second_scale,
+                                   Range<double>{.low = 0, .open = true}, scale)}));
   return result;
 }
 
 std::vector<OptionEntry> chain_entries(LangevinOptions& options) {
-  std::vector<OptionEntry> result{
+  return {
       number_or_auto("large_step_probability", options.large_step_probability, Range<double>{0, 1},
                      "probability of an independent proposal; auto: from the bootstrap"),
       choice("large_steps", options.large_steps, std::array<std::string_view, 2>{"path", "bdpt"},
-             "where independent proposals come from: the sensor, or both ends")};
-  append(result, delayed_rejection_entries(options.delayed_rejection, options.second_scale,
-                                           Range<double>{.low = 0, .open = true},
-                                           "scale of that second step, over that of the first"));
-  append(result, {target_acceptance(options.target_acceptance), direct(options.direct),
-                  chains(options.chains), bootstrap(options.bootstrap)});
-  return result;
+             "where independent proposals come from: the sensor, or both ends"),
+      target_acceptance(options.target_acceptance),
+      direct(options.direct),
+      chains(options.chains),
+      bootstrap(options.bootstrap)};
 }
 
 std::vector<OptionEntry> redistribution_entries(RedistributionOptions& options) {
@@ -247,6 +245,7 @@ std::vector<OptionEntry> entries(LangevinOptions& options) {
   append(result, step_size_entries(kernel,
                                    "radius, in radians, beyond which a step is not to go where "
                                    "constraints allow it"));
+  append(result, delayed_rejection_entries(options.delayed_rejection));
   append(result, only_with(
                      "mode=chain", [&options] { return options.mode == Mode::Chain; },
                      chain_entries(options)));
@@ -276,29 +275,27 @@ std::vector<OptionEntry> entries(LightOptions& options) { return {max_depth(opti
 
 std::vector<OptionEntry> entries(PrimaryOptions& options) {
   const Range<double> size{.low = 0, .high = 1, .open = true};
-  return {
+  std::vector<OptionEntry> result{
       number("large_step_probability", options.large_step_probability, Range<double>{0, 1},
              "probability of drawing all numbers anew"),
       number("step_min", options.step_min, size, "least size of a small step, at most step_max"),
       number("step_max", options.step_max, size, "largest size of a small step"),
-      direct(options.direct),
-      chains(options.chains),
-      bootstrap(options.bootstrap),
-      max_depth(options.max_depth),
   };
+  append(result, delayed_rejection_entries(
+                     options.delayed_rejection,
+                     "scale of that second step, over that of steps from step_min to step_max"));
+  append(result, {direct(options.direct), chains(options.chains), bootstrap(options.bootstrap),
+                  max_depth(options.max_depth)});
+  return result;
 }
 
 std::vector<OptionEntry> entries(MmltOptions& options) {
   std::vector<OptionEntry> result = entries(static_cast<PrimaryOptions&>(options));
-  std::vector<OptionEntry> more{
+  result.insert(
+      result.begin() + 1,
       choice("large_steps", options.large_steps, std::array<std::string_view, 2>{"one", "all"},
              "proposals drawn anew: of one strategy, or a whole bidirectional sample, of "
-             "which one path goes on")};
-  append(more, delayed_rejection_entries(
-                   options.delayed_rejection, options.second_scale,
-                   Range<double>{.low = 0, .high = 1, .open = true},
-                   "scale of that second step, over that of steps from step_min to step_max"));
-  result.insert(result.begin() + 1, more.begin(), more.end());
+             "which one path goes on"));
   return result;
 }
 
@@ -311,7 +308,7 @@ std::vector<OptionEntry> gaussian_step_entries(GaussianStepOptions& options,
   more.insert(more.begin(),
               number("isotropic_probability", options.isotropic_probability, Range<double>{0, 1},
                      "share of the small steps that are those of mmlt"));
-  result.insert(result.begin() + 4, more.begin(), more.end());
+  result.insert(result.begin() + 2, more.begin(), more.end());
   return result;
 }
 
@@ -360,8 +357,8 @@ std::vector<OptionEntry> entries(MalaOptions& options) {
       kernel,
       "radius, in halves of a number's range, beyond which a step is not to go where "
       "constraints allow it");
-  result.insert(result.begin() + 7, sizes.begin(), sizes.end());
-  result.insert(result.begin() + 7, target_acceptance(options.target_acceptance));
+  result.insert(result.begin() + 5, sizes.begin(), sizes.end());
+  result.insert(result.begin() + 5, target_acceptance(options.target_acceptance));
   return result;
 }
 
@@ -375,6 +372,7 @@ std::vector<OptionEntry> perturbation_entries(PerturbationOptions& options,
   first.push_back(number("step_min", options.step_min, size,
                          "least step of a perturbation, in widths of the film, at most step_max"));
   first.push_back(number("step_max", options.step_max, size, "largest step of a perturbation"));
+  append(first, delayed_rejection_entries(options.delayed_rejection));
   first.push_back(direct(options.direct));
   first.insert(first.end(), last.begin(), last.end());
   first.push_back(max_depth(options.max_depth));

@@ -92,14 +92,14 @@ void copy_vertices(const VertexPath& x, int first, int last, VertexPath& y, int 
 
 }  // namespace
 
-double acceptance_of(double log_pi_x, double log_pi_y, const MutationDensities& densities,
-                     Rejections& rejections) {
+double acceptance_ratio(double log_pi_x, double log_pi_y, const MutationDensities& densities,
+                        Rejections& rejections) {
   if (!std::isfinite(log_pi_y) || !std::isfinite(densities.forward) ||
       std::isnan(densities.reverse)) {
     ++rejections.non_finite;
     return 0.0;
   }
-  return std::exp(log_acceptance(log_pi_x, log_pi_y, densities.forward, densities.reverse));
+  return acceptance_ratio(log_pi_x, log_pi_y, densities.forward, densities.reverse);
 }
 
 PathMutation::PathMutation(const Scene& scene, const MutationLimits& limits)
@@ -295,8 +295,9 @@ TraceStatus PathMutation::joined(const VertexPath& y, int k) const {
 
 // ---- Perturbations ----------------------------------------------------------------------------
 
-double PathMutation::draw_step(Rng& rng) const {
-  return limits_.step_max * std::exp(rng.uniform() * std::log(limits_.step_min / limits_.step_max));
+double PathMutation::draw_step(double size, Rng& rng) const {
+  return size * limits_.step_max *
+         std::exp(rng.uniform() * std::log(limits_.step_min / limits_.step_max));
 }
 
 TraceStatus PathMutation::arrive_as(const VertexPath& x, int k, RayFollower& ray,
@@ -318,10 +319,10 @@ TraceStatus PathMutation::follow_delta(const VertexPath& y, int k, RayFollower& 
 }
 
 TraceStatus PathMutation::from_sensor(const VertexPath& x, VertexPath& y,
-                                      MutationDensities& densities, Rng& rng) const {
+                                      MutationDensities& densities, Rng& rng, double size) const {
   const Camera& camera = scene_.camera();
   const double angle_of_step = 2.0 * std::atan(camera.half_width);
-  const double r = draw_step(rng);
+  const double r = draw_step(size, rng);
   const double phi = 2.0 * kPi * rng.uniform();
   const Vec2d film =
       x.contribution().film +
@@ -340,7 +341,7 @@ TraceStatus PathMutation::from_sensor(const VertexPath& x, VertexPath& y,
       status = follow_delta(y, k, ray);
       if (status != TraceStatus::Ok) return status;
     } else {
-      ray.leave(y(k).surface, tilted(x.toward_light(k), angle_of_step * draw_step(rng), rng));
+      ray.leave(y(k).surface, tilted(x.toward_light(k), angle_of_step * draw_step(size, rng), rng));
     }
   }
   if (last == x.edges) {
@@ -359,14 +360,23 @@ TraceStatus PathMutation::from_sensor(const VertexPath& x, VertexPath& y,
 bool PathMutation::has_caustic(const VertexPath& x) { return x.edges > 1 && !x(1).delta; }
 
 TraceStatus PathMutation::perturb(const VertexPath& x, VertexPath& y, MutationDensities& densities,
-                                  Rng& rng) const {
-  return has_caustic(x) && rng.uniform() < 0.5 ? caustic(x, y, densities, rng)
-                                               : from_sensor(x, y, densities, rng);
+                                  Rng& rng, double size) const {
+  return has_caustic(x) && rng.uniform() < 0.5 ? caustic(x, y, densities, rng, size)
+                                               : from_sensor(x, y, densities, rng, size);
+}
+
+double PathMutation::propose(const VertexPath& x, VertexPath& y, double size, Rng& rng,
+                             Rejections& rejections) const {
+  MutationDensities densities;
+  if (!succeeded(perturb(x, y, densities, rng, size), rejections)) return 0.0;
+  return acceptance_ratio(x.contribution().log_target, y.contribution().log_target, densities,
+                          rejections);
 }
 
 /// The ray from x_m toward the sensor, moved.
-RayFollower PathMutation::moved_from_light(const VertexPath& x, int m, Rng& rng) const {
-  const double angle = 2.0 * std::atan(scene_.camera().half_width) * draw_step(rng);
+RayFollower PathMutation::moved_from_light(const VertexPath& x, int m, double size,
+                                           Rng& rng) const {
+  const double angle = 2.0 * std::atan(scene_.camera().half_width) * draw_step(size, rng);
   if (m == x.edges && x.end.at_infinity()) {
     const Vec3d& toward = x.end.p;
     const Vec3d across = tangent_basis(toward).t;
@@ -382,12 +392,12 @@ RayFollower PathMutation::moved_from_light(const VertexPath& x, int m, Rng& rng)
 }
 
 TraceStatus PathMutation::caustic(const VertexPath& x, VertexPath& y, MutationDensities& densities,
-                                  Rng& rng) const {
+                                  Rng& rng, double size) const {
   const int m = first_of_caustic(x);
   y.edges = x.edges;
   copy_vertices(x, m, x.edges - 1, y);
   y.end = x.end;
-  RayFollower ray = moved_from_light(x, m, rng);
+  RayFollower ray = moved_from_light(x, m, size, rng);
   for (int k = m - 1; k > 0; --k) {
     TraceStatus status = arrive_as(x, k, ray, y);
     if (status == TraceStatus::Ok) status = k > 1 ? follow_delta(y, k, ray) : joined(y, 1);

@@ -61,10 +61,10 @@ struct MutationDensities {
   double reverse = 0;
 };
 
-/// The probability of acceptance min(1, pi(y) T(x | y) / (pi(x) T(y | x))), pi(x) positive, in the
-/// measure of vertex_path.h. What is not finite, of y or of T, is counted and never accepted.
-double acceptance_of(double log_pi_x, double log_pi_y, const MutationDensities& densities,
-                     Rejections& rejections);
+/// The acceptance ratio pi(y) T(x | y) / (pi(x) T(y | x)), pi(x) positive, in the measure of
+/// vertex_path.h. What is not finite, of y or of T, is counted and never accepted.
+double acceptance_ratio(double log_pi_x, double log_pi_y, const MutationDensities& densities,
+                        Rejections& rejections);
 
 class PathMutation {
  public:
@@ -73,17 +73,23 @@ class PathMutation {
   /// Each draws y and evaluates it. Other than Ok: there is none, or it carries no light.
   TraceStatus bidirectional(const VertexPath& x, VertexPath& y, MutationDensities& densities,
                             Rng& rng) const;
-  /// The lens or multi-chain perturbation, one of which every path has.
+  /// The lens or multi-chain perturbation, one of which every path has; by steps of so many times
+  /// the usual sizes.
   TraceStatus from_sensor(const VertexPath& x, VertexPath& y, MutationDensities& densities,
-                          Rng& rng) const;
+                          Rng& rng, double size = 1.0) const;
   /// The caustic perturbation, of a path that has it.
-  TraceStatus caustic(const VertexPath& x, VertexPath& y, MutationDensities& densities,
-                      Rng& rng) const;
+  TraceStatus caustic(const VertexPath& x, VertexPath& y, MutationDensities& densities, Rng& rng,
+                      double size = 1.0) const;
   static bool has_caustic(const VertexPath& x);
   /// One of the perturbations of x, the two equally likely where it has both. They keep what this
   /// depends on, so each kind is in detailed balance by itself.
-  TraceStatus perturb(const VertexPath& x, VertexPath& y, MutationDensities& densities,
-                      Rng& rng) const;
+  TraceStatus perturb(const VertexPath& x, VertexPath& y, MutationDensities& densities, Rng& rng,
+                      double size = 1.0) const;
+
+  /// Draws y by a perturbation of so many times the usual size, and returns the acceptance ratio
+  /// with pi = f; 0 if there is no y, which is counted.
+  double propose(const VertexPath& x, VertexPath& y, double size, Rng& rng,
+                 Rejections& rejections) const;
 
   // The parts of the bidirectional mutation.
 
@@ -113,8 +119,8 @@ class PathMutation {
   /// The ray goes on by the delta lobe of vertex k of y.
   TraceStatus follow_delta(const VertexPath& y, int k, RayFollower& ray) const;
   TraceStatus joined(const VertexPath& y, int k) const;
-  double draw_step(Rng& rng) const;
-  RayFollower moved_from_light(const VertexPath& x, int m, Rng& rng) const;
+  double draw_step(double size, Rng& rng) const;
+  RayFollower moved_from_light(const VertexPath& x, int m, double size, Rng& rng) const;
 
   const Scene& scene_;
   MutationLimits limits_;

@@ -13,8 +13,12 @@ MutationLimits limits(int max_depth) {
 
 }  // namespace
 
-PerturbationChain::PerturbationChain(const Scene& scene, const Remainder& remainder, int max_depth)
-    : scene_(scene), remainder_(remainder), mutation_(scene, limits(max_depth)) {}
+PerturbationChain::PerturbationChain(const Scene& scene, const DelayedRejection& delayed_rejection,
+                                     const Remainder& remainder, int max_depth)
+    : scene_(scene),
+      delayed_rejection_(delayed_rejection),
+      remainder_(remainder),
+      mutation_(scene, limits(max_depth)) {}
 
 bool PerturbationChain::start_at(const FoundPath& path) {
   start_.path = vertex_path(path);
@@ -23,20 +27,18 @@ bool PerturbationChain::start_at(const FoundPath& path) {
   return std::isfinite(start_.share.log_remainder);
 }
 
-double PerturbationChain::propose(const Visit& from, Visit& to, Rng& rng) {
-  ++figures_.small_step.proposed;
+double PerturbationChain::propose(const Visit& from, Visit& to, MutationStage stage, Rng& rng,
+                                  Rejections& rejections) const {
   MutationDensities densities;
-  const TraceStatus status = mutation_.perturb(from.path, to.path, densities, rng);
-  if (!succeeded(status, figures_.rejections)) return 0.0;
+  const double size = stage == MutationStage::Second ? delayed_rejection_.second_scale : 1.0;
+  const TraceStatus status = mutation_.perturb(from.path, to.path, densities, rng, size);
+  if (!succeeded(status, rejections)) return 0.0;
   to.share = remainder_.share(to.path);
   if (!std::isfinite(to.share.log_remainder)) {
-    ++figures_.rejections.hastings;
+    ++rejections.hastings;
     return 0.0;
   }
-  const double acceptance = acceptance_of(from.share.log_remainder, to.share.log_remainder,
-                                          densities, figures_.rejections);
-  figures_.small_step.accepted += acceptance;
-  return acceptance;
+  return acceptance_ratio(from.share.log_remainder, to.share.log_remainder, densities, rejections);
 }
 
 }  // namespace driftlight

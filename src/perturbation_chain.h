@@ -19,7 +19,8 @@ namespace driftlight {
 class PerturbationChain {
  public:
   /// Of paths of at most so many edges.
-  PerturbationChain(const Scene& scene, const Remainder& remainder, int max_depth);
+  PerturbationChain(const Scene& scene, const DelayedRejection& delayed_rejection,
+                    const Remainder& remainder, int max_depth);
 
   /// The path that the next chains start from. False if by rounding nothing of it remains.
   bool start_at(const FoundPath& path);
@@ -27,9 +28,10 @@ class PerturbationChain {
   /// As RemainderChain::run.
   template <class Splat>
   void run(std::uint64_t mutations, Rng& rng, const Splat& splat) {
-    figures_.rejections.hastings += run_mutations(
-        start_, visits_, mutations, rng,
-        [&](const Visit& from, Visit& to) { return propose(from, to, rng); },
+    run_mutations(
+        start_, visits_, {mutations, delayed_rejection_.on}, rng, figures_,
+        [&](const Visit& from, Visit& to, MutationStage stage, Rng& numbers,
+            Rejections& rejections) { return propose(from, to, stage, numbers, rejections); },
         [&](const Visit& at, double weight) {
           splat(at.share, at.path.contribution().color, weight);
         });
@@ -44,14 +46,16 @@ class PerturbationChain {
     Share share;
   };
 
-  /// The acceptance probability of a perturbation from `from` to `to`.
-  double propose(const Visit& from, Visit& to, Rng& rng);
+  /// As run_mutations has it.
+  double propose(const Visit& from, Visit& to, MutationStage stage, Rng& rng,
+                 Rejections& rejections) const;
 
   const Scene& scene_;
+  DelayedRejection delayed_rejection_;
   const Remainder& remainder_;
   PathMutation mutation_;
   Visit start_;
-  std::array<Visit, 2> visits_;
+  std::array<Visit, 3> visits_;
   ChainFigures figures_;
 };
 

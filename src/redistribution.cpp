@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "chain_counts.h"
 #include "chain_pilot.h"
 #include "chain_schedule.h"
 #include "driftlight/error.h"
@@ -37,6 +37,7 @@ struct Redistribution {
   double unit;
   double deposit;  ///< epsilon
   ExactSum remainders;
+  ChainCounts counts;                  ///< of the chains
   std::optional<ProbedStarts> probed;  ///< if gradients are checked
 
   Redistribution(const Scene& of_scene, const LangevinOptions& with, const RenderOptions& render)
@@ -73,25 +74,6 @@ struct Redistribution {
       image.rgb[i] += chains.rgb[i] + particles.rgb[i];
     return image;
   }
-
-  void count(const ChainFigures& figures, std::uint64_t starts) {
-    accepted_.add(figures.small_step.accepted);
-    const std::lock_guard lock(mutex_);
-    statistics_.small_step.proposed += figures.small_step.proposed;
-    statistics_.rejections += figures.rejections;
-    statistics_.starts += starts;
-  }
-  /// Of the chains.
-  LangevinStatistics statistics() const {
-    LangevinStatistics result = statistics_;
-    result.small_step.accepted = accepted_.value();
-    return result;
-  }
-
- private:
-  ExactSum accepted_;
-  std::mutex mutex_;
-  LangevinStatistics statistics_;
 };
 
 /// One bidirectional sample, the chains that start from it, and the particles beside it.
@@ -100,8 +82,10 @@ class RedistributionSampler {
   explicit RedistributionSampler(Redistribution& common)
       : common_(common),
         tracer_(common.scene, common.pilot.guide, MisHeuristic::Power, common.options.max_depth),
-        chain_(common.scene, common.options.kernel, common.remainder, common.layers),
-        perturbations_(common.scene, common.remainder, common.options.max_depth),
+        chain_(common.scene, common.options.kernel, common.options.delayed_rejection,
+               common.remainder, common.layers),
+        perturbations_(common.scene, common.options.delayed_rejection, common.remainder,
+                       common.options.max_depth),
         splitting_(common.splitting) {}
 
   void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& film_sink) {
@@ -111,8 +95,8 @@ class RedistributionSampler {
     tracer_.sample(film, rng, sink);
     if (left_ > 0.0) common_.remainders.add(left_);
     if (starts_ > 0) {
-      common_.count(chain_.take_statistics(), starts_);
-      common_.count(perturbations_.take_statistics(), 0);
+      common_.counts.add(chain_.take_statistics(), starts_);
+      common_.counts.add(perturbations_.take_statistics(), 0);
     }
     splitting_.sample(film, rng);
   }
@@ -249,9 +233,8 @@ LangevinResult render_redistribution(const Scene& scene, const LangevinOptions& 
   if (render.shares != nullptr)
     *render.shares = shares(film.image(passes), chains, particles, common.splitting.families());
   result.image = std::move(samples.image);
-  result.statistics = common.statistics();
+  result.statistics = common.counts.statistics();
   common.splitting.report(particles, result.statistics);
-  result.statistics.mutations = result.statistics.small_step.proposed;
   if (common.probed) result.gradient_check = common.probed->table();
   result.statistics.b = mean_luminance(result.image);
   if (!(result.statistics.b > 0.0) && !samples.stopped)

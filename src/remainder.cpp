@@ -64,20 +64,21 @@ void RemainderChain::start_at(const BrightPath& path) {
   start_.share = path.share;
 }
 
-double RemainderChain::propose(Visit& from, Visit& to, Rng& rng) {
-  ++figures_.small_step.proposed;
-  if (!small_step_.propose(from.state, to.state, rng, figures_.rejections)) return 0.0;
+double RemainderChain::propose(Visit& from, Visit& to, MutationStage stage, Rng& rng,
+                               Rejections& rejections) {
+  const bool proposed = stage == MutationStage::Second
+                            ? small_step_.propose_again(from.state, to.state, rng, rejections)
+                            : small_step_.propose(from.state, to.state, rng, rejections);
+  if (!proposed) return 0.0;
   to.share = remainder_.share(to.state.topology, to.state.coordinates, to.state.contribution);
   if (!std::isfinite(to.share.log_remainder)) {
-    ++figures_.rejections.hastings;
+    ++rejections.hastings;
     return 0.0;
   }
-  const auto densities = small_step_.log_densities(from.state, to.state, figures_.rejections);
+  const auto densities = small_step_.log_densities(from.state, to.state, rejections);
   if (!densities) return 0.0;
-  const double acceptance = std::exp(log_acceptance(
-      from.share.log_remainder, to.share.log_remainder, densities->forward, densities->reverse));
-  figures_.small_step.accepted += acceptance;
-  return acceptance;
+  return acceptance_ratio(from.share.log_remainder, to.share.log_remainder, densities->forward,
+                          densities->reverse);
 }
 
 }  // namespace driftlight

@@ -92,18 +92,16 @@ class Remainder {
   double tau_;
 };
 
-struct ChainFigures {
-  KernelStatistics small_step;
-  Rejections rejections;
-};
-
 /// Runs short chains that leave the remainder invariant.
 class RemainderChain {
  public:
-  /// Steps are recorded in `layers` unless it is null.
-  RemainderChain(const Scene& scene, const KernelOptions& kernel, const Remainder& remainder,
+  /// Steps are recorded in `layers` unless it is null. The kernel must outlive it.
+  RemainderChain(const Scene& scene, const KernelOptions& kernel,
+                 const DelayedRejection& delayed_rejection, const Remainder& remainder,
                  StepLayers* layers)
-      : remainder_(remainder), small_step_(scene, kernel), layers_(layers) {}
+      : remainder_(remainder),
+        small_step_(scene, kernel, delayed_rejection.scale()),
+        layers_(layers) {}
 
   /// The path that the next chains start from.
   void start_at(const BrightPath& path);
@@ -125,28 +123,30 @@ class RemainderChain {
     Share share;
   };
 
-  /// The acceptance probability of a step from `from` to `to`.
-  double propose(Visit& from, Visit& to, Rng& rng);
+  /// As run_mutations has it.
+  double propose(Visit& from, Visit& to, MutationStage stage, Rng& rng, Rejections& rejections);
 
   const Remainder& remainder_;
   SmallStep small_step_;
   StepLayers* layers_;
   Visit start_;
-  std::array<Visit, 2> visits_;
+  std::array<Visit, 3> visits_;
   ChainFigures figures_;
 };
 
 template <class Splat>
 void RemainderChain::run(std::uint64_t mutations, Rng& rng, const Splat& splat) {
-  const auto propose = [&](Visit& from, Visit& to) {
-    const double acceptance = this->propose(from, to, rng);
-    if (layers_ != nullptr) small_step_.record(from.state, acceptance, *layers_);
-    return acceptance;
+  const auto propose = [&](Visit& from, Visit& to, MutationStage stage, Rng& numbers,
+                           Rejections& rejections) {
+    const double ratio = this->propose(from, to, stage, numbers, rejections);
+    if (layers_ != nullptr && stage == MutationStage::First)
+      small_step_.record(from.state, std::min(1.0, ratio), *layers_);
+    return ratio;
   };
-  figures_.rejections.hastings +=
-      run_mutations(start_, visits_, mutations, rng, propose, [&](const Visit& at, double weight) {
-        splat(at.share, at.state.contribution.color, weight);
-      });
+  run_mutations(start_, visits_, {mutations, small_step_.delays_rejection()}, rng, figures_,
+                propose, [&](const Visit& at, double weight) {
+                  splat(at.share, at.state.contribution.color, weight);
+                });
 }
 
 }  // namespace driftlight

@@ -39,6 +39,7 @@ LevelFigures& LevelFigures::operator+=(const LevelFigures& other) {
   ratio += other.ratio;
   squared_ratio += other.squared_ratio;
   steps += other.steps;
+  second_steps += other.second_steps;
   rejections += other.rejections;
   return *this;
 }

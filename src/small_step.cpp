@@ -46,11 +46,27 @@ bool succeeded(TraceStatus status, Rejections& rejections) {
   return false;
 }
 
+namespace {
+
+/// -infinity if anything is NaN.
+double log_acceptance_ratio(double log_target_from, double log_target_to, double log_pdf_forward,
+                            double log_pdf_reverse) {
+  const double log_ratio = log_target_to - log_target_from + log_pdf_reverse - log_pdf_forward;
+  return std::isnan(log_ratio) ? -std::numeric_limits<double>::infinity() : log_ratio;
+}
+
+}  // namespace
+
+double acceptance_ratio(double log_target_from, double log_target_to, double log_pdf_forward,
+                        double log_pdf_reverse) {
+  return std::exp(
+      log_acceptance_ratio(log_target_from, log_target_to, log_pdf_forward, log_pdf_reverse));
+}
+
 double log_acceptance(double log_target_from, double log_target_to, double log_pdf_forward,
                       double log_pdf_reverse) {
-  const double log_ratio = log_target_to - log_target_from + log_pdf_reverse - log_pdf_forward;
-  return std::isnan(log_ratio) ? -std::numeric_limits<double>::infinity()
-                               : std::min(0.0, log_ratio);
+  return std::min(
+      0.0, log_acceptance_ratio(log_target_from, log_target_to, log_pdf_forward, log_pdf_reverse));
 }
 
 double log_refused(double log_pdf, double log_first_acceptance) {
@@ -105,9 +121,9 @@ bool SmallStep::propose(ChainState& from, ChainState& to, Rng& rng, Rejections& 
   return step(from, to, rng, rejections);
 }
 
-bool SmallStep::propose_again(ChainState& from, ChainState& to, double factor, Rng& rng,
-                              Rejections& rejections) {
-  scale_ = factor * first_scale_;
+bool SmallStep::propose_again(ChainState& from, ChainState& to, Rng& rng, Rejections& rejections) {
+  if (!from.finite) return false;  // counted before
+  scale_ = *second_scale_ * first_scale_;
   return step(from, to, rng, rejections);
 }
 

@@ -2,8 +2,12 @@
 #include "splitting.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
+
+#include "mutation_loop.h"
 
 namespace driftlight {
 namespace {
@@ -43,6 +47,12 @@ KernelOptions level_kernel(const LangevinOptions& options) {
   return kernel;
 }
 
+void add_to(LevelFigures& level, const ChainFigures& walked) {
+  level.steps += walked.small_step;
+  level.second_steps += walked.second_step;
+  level.rejections += walked.rejections;
+}
+
 }  // namespace
 
 bool SplittingPlan::takes(LobeSequence sequence) const {
@@ -53,22 +63,23 @@ bool SplittingPlan::takes(LobeSequence sequence) const {
 
 /// The particle at one level above the last.
 struct Splitter::Level {
-  explicit Level(const Scene& of_scene, const KernelOptions& kernel)
-      : scene(of_scene), small_step(of_scene, kernel) {}
+  Level(const Scene& of_scene, const KernelOptions& kernel, std::optional<double> second_scale)
+      : scene(of_scene), small_step(of_scene, kernel, second_scale) {}
 
   void enter(const PathTopology& topology, const PathCoordinates& coordinates,
              const Contribution& at) {
-    current->topology = topology;
-    current->coordinates = coordinates;
-    current->contribution = at;
-    current->has_step = false;
+    start.topology = topology;
+    start.coordinates = coordinates;
+    start.contribution = at;
+    start.has_step = false;
+    current = &start;
   }
 
   const Scene& scene;
   SmallStep small_step;
-  ChainState states[2];
-  ChainState* current = &states[0];
-  ChainState* proposed = &states[1];
+  ChainState start;
+  std::array<ChainState, 3> memory;
+  ChainState* current = &start;
 };
 
 struct Splitter::Particles {
@@ -91,10 +102,11 @@ struct Splitter::Particles {
         kernel_of_last(last_kernel(options)),
         kernel_of_levels(level_kernel(options)),
         steps(options.splitting.steps.value_or(scenes.soften_lobes() ? kStepsInLobes : kSteps)),
-        last(scene, kernel_of_last, remainder, layers),
+        last(scene, kernel_of_last, options.delayed_rejection, remainder, layers),
         figures(static_cast<std::size_t>(scenes.top()) + 1) {
     for (int k = 1; k <= scenes.top(); ++k)
-      levels.push_back(std::make_unique<Level>(scenes[k], kernel_of_levels));
+      levels.push_back(
+          std::make_unique<Level>(scenes[k], kernel_of_levels, options.delayed_rejection.scale()));
   }
 
   Level& level(int k) { return *levels[static_cast<std::size_t>(k - 1)]; }
@@ -107,23 +119,22 @@ struct Splitter::Particles {
   /// Steps that leave pi_k invariant.
   void walk(int k, Rng& rng) {
     Level& at = level(k);
-    LevelFigures& counts = figures_of(k);
-    for (int i = 0; i < steps; ++i) {
-      ++counts.steps.proposed;
-      ChainState& from = *at.current;
-      ChainState& to = *at.proposed;
-      if (!at.small_step.propose(from, to, rng, counts.rejections)) continue;
-      const auto densities = at.small_step.log_densities(from, to, counts.rejections);
-      if (!densities) continue;
-      const double acceptance =
-          std::exp(log_acceptance(log_target(from.contribution), log_target(to.contribution),
-                                  densities->forward, densities->reverse));
-      counts.steps.accepted += acceptance;
-      if (rng.uniform() < acceptance)
-        std::swap(at.current, at.proposed);
-      else
-        ++counts.rejections.hastings;
-    }
+    const auto propose = [&](ChainState& from, ChainState& to, MutationStage stage, Rng& numbers,
+                             Rejections& rejections) {
+      const bool proposed = stage == MutationStage::Second
+                                ? at.small_step.propose_again(from, to, numbers, rejections)
+                                : at.small_step.propose(from, to, numbers, rejections);
+      if (!proposed) return 0.0;
+      const auto densities = at.small_step.log_densities(from, to, rejections);
+      if (!densities) return 0.0;
+      return acceptance_ratio(log_target(from.contribution), log_target(to.contribution),
+                              densities->forward, densities->reverse);
+    };
+    ChainFigures walked;
+    at.current = &run_mutations(
+        at.start, at.memory, {static_cast<std::uint64_t>(steps), at.small_step.delays_rejection()},
+        rng, walked, propose, [](const ChainState&, double) {});
+    add_to(figures_of(k), walked);
   }
 
   /// From level k > 0, with a particle there, to the end.
@@ -262,8 +273,7 @@ void Splitter::sample(const Vec2d& film, const SplittingPlan& plan, Rng& rng, co
 std::vector<LevelFigures> Splitter::take_figures() {
   if (!particles_) return {};
   const ChainFigures last = particles_->last.take_statistics();
-  particles_->figures_of(0).steps += last.small_step;
-  particles_->figures_of(0).rejections += last.rejections;
+  add_to(particles_->figures_of(0), last);
   std::vector<LevelFigures> figures(particles_->figures.size());
   std::swap(figures, particles_->figures);
   return figures;

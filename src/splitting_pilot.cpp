@@ -116,7 +116,7 @@ PilotRun run_task(const Setup& pilot, const SplittingPlan& plan, std::uint64_t f
   }
   result.levels = splitter.take_figures();
   for (const LevelFigures& level : result.levels)
-    result.steps += static_cast<double>(level.steps.proposed);
+    result.steps += static_cast<double>(level.steps.proposed + level.second_steps.proposed);
   return result;
 }
 

@@ -67,6 +67,7 @@ Image SplittingShare::image(double passes) const {
 void SplittingShare::report(const Image& image, LangevinStatistics& statistics) const {
   for (const LevelFigures& level : figures_) {
     statistics.small_step += level.steps;
+    statistics.second_step += level.second_steps;
     statistics.rejections += level.rejections;
   }
   statistics.levels = figures_;

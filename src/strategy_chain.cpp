@@ -6,6 +6,8 @@
 #include <tuple>
 #include <type_traits>
 
+#include "mutation_loop.h"
+
 namespace driftlight {
 namespace {
 
@@ -48,8 +50,8 @@ StrategyChain::StrategyChain(const StrategyTarget& target, const StrategyMethod&
       deposits_(film),
       rng_(rng),
       second_(options_) {
-  second_.step_min *= options_.second_scale;
-  second_.step_max *= options_.second_scale;
+  second_.step_min *= options_.delayed_rejection.second_scale;
+  second_.step_max *= options_.delayed_rejection.second_scale;
   current_.numbers = start;
   if (options_.large_steps == StrategyLargeSteps::All)
     draw(current_, deposits_.current);
@@ -65,7 +67,7 @@ void StrategyChain::run(std::uint64_t mutations) {
 void StrategyChain::mutate() {
   const bool large = rng_.uniform() < options_.large_step_probability;
   const bool isotropic = !large && rng_.uniform() < isotropic_probability_;
-  if (!large && options_.delayed_rejection) return take_delayed_step(isotropic);
+  if (!large && options_.delayed_rejection.on) return take_delayed_step(isotropic);
   const double acceptance_ratio = large       ? propose_large()
                                   : isotropic ? propose_isotropic()
                                               : propose_gaussian();
@@ -125,8 +127,8 @@ double StrategyChain::propose_second(double first_acceptance, bool isotropic) {
     to_ghost = acceptance_of(std::exp(log_ghost - log_there) * ratio(ghost_place_.target, there),
                              statistics_.rejections);
   const double log_here = isotropic ? 0.0 : log_density_;
-  return std::exp(log_there - log_here) * there * (1.0 - to_ghost) /
-         (deposits_.current.target * (1.0 - first_acceptance));
+  return second_acceptance(std::exp(log_there - log_here) * there / deposits_.current.target,
+                           first_acceptance, to_ghost);
 }
 
 double StrategyChain::propose_large() {

@@ -18,7 +18,7 @@ namespace driftlight {
 class VeachChain {
  public:
   /// Starts at a path that carries light and is evaluated.
-  VeachChain(const PathMutation& mutation, double bidirectional_probability, Film& film,
+  VeachChain(const PathMutation& mutation, const MltOptions& options, Film& film,
              const VertexPath& start, Rng rng);
 
   /// Runs mutations, each splatting both paths with weights 1 - a and a.
@@ -29,12 +29,24 @@ class VeachChain {
   const LangevinStatistics& statistics() const { return statistics_; }
 
  private:
+  VertexPath& current() { return paths_[current_]; }
+  VertexPath& proposed() { return paths_[proposed_]; }
+  /// The acceptance ratio of a bidirectional mutation to `proposed`.
+  double propose_bidirectional();
+  /// Delayed rejection (mutation_loop.h): a perturbation, and where it is refused a smaller one.
+  void take_delayed_step();
+  /// Moves with this probability to the path of this index; true if it moved.
+  bool resolve(double acceptance, std::size_t& index);
+
   const PathMutation& mutation_;
   double bidirectional_probability_;
+  DelayedRejection delayed_rejection_;
   Film& film_;
   Rng rng_;
-  std::array<VertexPath, 2> paths_;
+  std::array<VertexPath, 3> paths_;
   std::size_t current_ = 0;
+  std::size_t proposed_ = 1;
+  std::size_t second_ = 2;
   double gathered_ = 0;  ///< weight of the current path not yet splatted
   LangevinStatistics statistics_;
 };

@@ -17,15 +17,15 @@ namespace {
 
 /// The chains with what they are started from.
 struct VeachChains {
-  double bidirectional_probability;
+  const MltOptions& options;
   PathMutation mutation;
   RunningMean bootstrap_weights;  ///< f / q
   std::vector<std::unique_ptr<VeachChain>> all;
 
   /// No chains if paths of min_edges and more carry no light.
-  VeachChains(const Scene& scene, const MltOptions& options, const RenderOptions& render,
+  VeachChains(const Scene& scene, const MltOptions& with, const RenderOptions& render,
               int min_edges, Film& film)
-      : bidirectional_probability(options.bidirectional_probability),
+      : options(with),
         mutation(scene, {min_edges, options.max_depth, options.step_min, options.step_max}) {
     if (min_edges > options.max_depth) return;
     PathSampler sampler(scene, options.max_depth, LargeSteps::Bdpt, min_edges,
@@ -38,7 +38,7 @@ struct VeachChains {
       // But for rounding its light is that of the sample.
       if (!start.evaluate(scene)) continue;
       const auto index = static_cast<std::uint64_t>(all.size());
-      all.push_back(std::make_unique<VeachChain>(mutation, bidirectional_probability, film, start,
+      all.push_back(std::make_unique<VeachChain>(mutation, options, film, start,
                                                  Rng(render.seed, Stream::Chain, index)));
     }
   }
@@ -57,7 +57,7 @@ struct VeachChains {
   LangevinStatistics statistics() const {
     LangevinStatistics sum;
     for (const auto& chain : all) sum += chain->statistics();
-    sum.large_step_probability = bidirectional_probability;
+    sum.large_step_probability = options.bidirectional_probability;
     sum.b = bootstrap_weights.mean();
     sum.b_error = all.empty() ? 0.0 : bootstrap_weights.error();
     return sum;

@@ -145,7 +145,7 @@ const std::vector<Mistake> kRenderMistakes{
     {{"scene.xml", "--integrator", "mlt", "--set", "step_min=0.5"}, {"step_min", "step_max"}},
     {{"scene.xml", "--integrator", "erpt", "--set", "pilot=1"}, {"pilot", "'1'", "[256"}},
     {{"scene.xml", "--set", "second_scale=0"}, {"second_scale", "'0'", "> 0"}},
-    {{"scene.xml", "--set", "delayed_rejection=on"}, {"delayed_rejection", "mode=chain"}},
+    {{"scene.xml", "--set", "second_scale=0.1"}, {"second_scale", "delayed_rejection=on"}},
     {{"scene.xml", "--set", "levels=2", "--set", "mode=chain"}, {"levels", "mode=splitting"}},
     {{"scene.xml", "--time", "1", "--mutations-per-pixel", "4"}, {"only one", "--time"}},
     {{"scene.xml", "--integrator", "path", "--time", "1", "--spp", "4"}, {"only one", "--spp"}},

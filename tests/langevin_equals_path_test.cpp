@@ -81,6 +81,11 @@ const std::map<std::string, Way>& ways() {
        {.mode = Mode::Redistribution,
         .phase_space = PhaseSpace::Bidirectional,
         .redistribution = {.threshold = 0.5, .chain_length = 20, .perturbations = 0.5}}},
+      {"delayed_chains",
+       {.mode = Mode::Redistribution,
+        .phase_space = PhaseSpace::Bidirectional,
+        .redistribution = {.threshold = 0.5, .chain_length = 20, .perturbations = 0.5},
+        .delayed_rejection = true}},
       {"short_chains",
        {.mode = Mode::Redistribution, .drift = Drift::None, .redistribution = {0.2, 7, 6, 0}}},
       {"rare_light_subpaths",
@@ -94,6 +99,10 @@ const std::map<std::string, Way>& ways() {
       {"splitting",
        {.mode = Mode::Splitting,
         .splitting = {.all = true, .levels = std::nullopt, .steps = std::nullopt}}},
+      {"delayed_particles",
+       {.mode = Mode::Splitting,
+        .splitting = {.all = true, .levels = std::nullopt, .steps = std::nullopt},
+        .delayed_rejection = true}},
       {"low_threshold",
        {.mode = Mode::Splitting,
         .phase_space = PhaseSpace::Bidirectional,
@@ -180,7 +189,7 @@ TEST_P(LangevinEqualsPath, TileMeans) {
   options.phase_space = way.phase_space;
   options.redistribution = way.redistribution;
   options.splitting = way.splitting;
-  options.delayed_rejection = way.delayed_rejection;
+  options.delayed_rejection.on = way.delayed_rejection;
   options.redistribution.pilot = 16384;
   options.splitting.pilot = 8192;
   options.bootstrap = work.bootstrap;
@@ -214,6 +223,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"ring_caustic", "trust_region"}, Case{"limelight", "from_sensor"},
                     Case{"limelight", "chains_alone"}, Case{"limelight", "rare_light_subpaths"},
                     Case{"limelight", "diagonal"}, Case{"limelight", "half_perturbed"},
+                    Case{"limelight", "delayed_chains"}, Case{"sun_pane", "delayed_particles"},
                     Case{"coated", "gradient"}, Case{"coated", "redistribution_both_ends"},
                     Case{"sun_pane", "high_threshold"}, Case{"lamp_in_glass", "two_levels"},
                     Case{"pool_caustic", "low_threshold"}, Case{"plan", "both_ends"},
@@ -255,12 +265,14 @@ TEST_P(PrimaryEqualsPath, TileMeans) {
       options.bootstrap = work.bootstrap;
       options.max_depth = loaded.max_depth.value();
       options.direct = scene == "limelight" ? DirectLight::Chain : DirectLight::Apart;
+      options.delayed_rejection.on = name.ends_with("_delayed");
       return options;
     };
     const double amount = work.mutations_per_pixel;
-    if (name == "pssmlt")
+    if (name.starts_with("pssmlt"))
       return render_pssmlt(loaded.scene, with(PssmltOptions{}), render, amount).image;
-    if (name == "h2mc") return render_h2mc(loaded.scene, with(H2mcOptions{}), render, amount).image;
+    if (name.starts_with("h2mc"))
+      return render_h2mc(loaded.scene, with(H2mcOptions{}), render, amount).image;
     if (name == "lmc") return render_lmc(loaded.scene, with(LmcOptions{}), render, amount).image;
     if (name == "lmc_cached") {
       LmcOptions options = with(LmcOptions{});
@@ -268,11 +280,6 @@ TEST_P(PrimaryEqualsPath, TileMeans) {
       return render_lmc(loaded.scene, options, render, amount).image;
     }
     if (name == "mala") return render_mala(loaded.scene, with(MalaOptions{}), render, amount).image;
-    if (name == "h2mc_delayed") {
-      H2mcOptions options = with(H2mcOptions{});
-      options.delayed_rejection = true;
-      return render_h2mc(loaded.scene, options, render, amount).image;
-    }
     return render_mmlt(loaded.scene, with(MmltOptions{}), render, 2.0 * amount).image;
   };
   test::expect_equal_tiles(name, tiles_over_runs(image), traced_tiles(scene), work.resolution);
@@ -281,6 +288,7 @@ TEST_P(PrimaryEqualsPath, TileMeans) {
 INSTANTIATE_TEST_SUITE_P(Some, PrimaryEqualsPath,
                          testing::Values(Case{"limelight", "mmlt"}, Case{"limelight", "pssmlt"},
                                          Case{"limelight", "h2mc_delayed"},
+                                         Case{"limelight", "pssmlt_delayed"},
                                          Case{"limelight", "lmc_cached"}, Case{"lens", "lmc"},
                                          Case{"limelight", "mala"}),
                          name_of);
@@ -288,7 +296,8 @@ INSTANTIATE_TEST_SUITE_P(Some, PrimaryEqualsPath,
 std::vector<Case> all_primary_cases() {
   std::vector<Case> cases;
   for (const auto& scene : works())
-    for (const char* name : {"pssmlt", "mmlt", "h2mc", "h2mc_delayed", "lmc", "lmc_cached", "mala"})
+    for (const char* name :
+         {"pssmlt", "pssmlt_delayed", "mmlt", "h2mc", "h2mc_delayed", "lmc", "lmc_cached", "mala"})
       cases.emplace_back(scene.first, name);
   return cases;
 }
@@ -306,9 +315,10 @@ Image render_by_mutations(const LoadedScene& loaded, const std::string& name, Di
   const auto with = [&](auto options) {
     options.max_depth = loaded.max_depth.value();
     options.direct = direct;
+    options.delayed_rejection.on = name.ends_with("_delayed");
     return options;
   };
-  if (name == "erpt") {
+  if (name.starts_with("erpt")) {
     ErptOptions options = with(ErptOptions{});
     options.mutations_per_sample = 25;
     options.chain_length = 50;
@@ -332,7 +342,9 @@ TEST_P(MutationsEqualPath, TileMeans) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Some, MutationsEqualPath,
-                         testing::Values(Case{"limelight", "mlt"}, Case{"limelight", "erpt"}),
+                         testing::Values(Case{"limelight", "mlt"}, Case{"limelight", "erpt"},
+                                         Case{"limelight", "mlt_delayed"},
+                                         Case{"limelight", "erpt_delayed"}),
                          name_of);
 
 /// All that a pinhole sees.
@@ -340,7 +352,8 @@ std::vector<Case> all_mutation_cases() {
   std::vector<Case> cases;
   for (const auto& scene : works())
     if (scene.first != "plan" && scene.first != "lens")
-      for (const char* name : {"mlt", "erpt"}) cases.emplace_back(scene.first, name);
+      for (const char* name : {"mlt", "mlt_delayed", "erpt", "erpt_delayed"})
+        cases.emplace_back(scene.first, name);
   return cases;
 }
 

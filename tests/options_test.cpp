@@ -67,7 +67,7 @@ TEST(Options, ConditionsFollowTheOtherOptions) {
   EXPECT_EQ(error("threshold"),
             "option threshold does nothing without mode=redistribution or splitting");
   EXPECT_EQ(error("second_scale"), "option second_scale does nothing without delayed_rejection=on");
-  options.delayed_rejection = true;
+  options.delayed_rejection.on = true;
   EXPECT_EQ(error("second_scale"), "");
 }
 

@@ -33,20 +33,41 @@ double distance(double a, double b) {
   return std::min(d, 1.0 - d);
 }
 
+/// From the point of a second step the first one leads to the ghost, and the second one back.
+TEST(PrimarySample, GhostIsMovedByBothSteps) {
+  const PrimaryOptions options;
+  PrimarySample sample(options, Rng(6, Stream::Test, 0));
+  const std::vector<double> start = read(sample, 2);
+  sample.propose_small();
+  const std::vector<double> first = read(sample, 2);
+  sample.propose_second();
+  const std::vector<double> second = read(sample, 3);
+  sample.show_ghost();
+  const std::vector<double> ghost = read(sample, 4);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_NEAR(distance(ghost[i], second[i]), distance(first[i], start[i]), 1e-12);
+    EXPECT_NEAR(distance(ghost[i], first[i]), distance(second[i], start[i]), 1e-12);
+    EXPECT_LE(distance(second[i], start[i]),
+              options.delayed_rejection.second_scale * options.step_max + 1e-12);
+  }
+  sample.accept_second();
+  sample.propose_small();
+  const std::vector<double> next = read(sample, 3);
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_LE(distance(next[i], second[i]), options.step_max + 1e-12);
+}
+
 TEST(PrimarySample, RejectionBringsTheOldPointBack) {
   const PrimaryOptions options;
   PrimarySample sample(options, Rng(1, Stream::Test, 0));
   const std::vector<double> start = read(sample, 4);
   sample.propose_small();
   EXPECT_NE(read(sample, 4), start);
-  sample.reject();
   sample.propose_large();
   EXPECT_NE(read(sample, 6), start);
-  sample.reject();
   // A step that asks for fewer leaves the others where they were, and asks them to follow later.
   sample.propose_small();
   EXPECT_NE(read(sample, 1).front(), start.front());
-  sample.reject();
   PrimarySample copy = sample;
   copy.propose_small();
   const std::vector<double> moved = read(copy, 4);
@@ -90,9 +111,18 @@ TEST(PrimarySample, StaysUniform) {
     Rng rng(3, Stream::Test, 2 * i + 1);
     sample.next();
     for (int step = 0; step < 20; ++step) {
-      rng.uniform() < 0.2 ? sample.propose_large() : sample.propose_small();
+      const bool large = rng.uniform() < 0.2;
+      large ? sample.propose_large() : sample.propose_small();
       read(sample, rng.uniform() < 0.3 ? 3 : 1);
-      rng.uniform() < 0.5 ? sample.accept() : sample.reject();
+      if (rng.uniform() < 0.5) {
+        sample.accept();
+      } else if (!large) {
+        sample.propose_second();
+        read(sample, rng.uniform() < 0.3 ? 3 : 1);
+        sample.show_ghost();
+        read(sample, rng.uniform() < 0.3 ? 3 : 1);
+        if (rng.uniform() < 0.5) sample.accept_second();
+      }
     }
     sample.propose_small();
     const std::vector<double> values = read(sample, 3);

@@ -54,9 +54,8 @@ class Chain {
   ChainState states_[3];
   std::size_t current_ = 0;
   std::size_t proposed_ = 1;
-  std::size_t second_ = 2;              ///< proposed by a second step
-  std::optional<double> second_scale_;  ///< of delayed rejection
-  double gathered_ = 0;                 ///< weight of the current state not yet splatted
+  std::size_t second_ = 2;  ///< proposed by a second step
+  double gathered_ = 0;     ///< weight of the current state not yet splatted
   StepLayers* layers_;
   LangevinStatistics statistics_;
   RunningMean weights_;

@@ -118,6 +118,16 @@ struct SplittingOptions {
   int pilot = 16384;
 };
 
+/// Delayed rejection (Tierney and Mira 1999; Green and Mira 2001; in light transport Rioux-Lavoie
+/// et al. 2020): a small step that is rejected is followed by a second, smaller one.
+struct DelayedRejection {
+  bool on = false;
+  double second_scale = 0.2;  ///< of that step, over the first
+
+  /// The scale if it is on.
+  std::optional<double> scale() const { return on ? std::optional(second_scale) : std::nullopt; }
+};
+
 /// The Langevin sampler of [E63].
 struct LangevinOptions {
   Mode mode = Mode::Splitting;
@@ -131,11 +141,7 @@ struct LangevinOptions {
   std::optional<double> large_step_probability;
   LargeSteps large_steps = LargeSteps::Bdpt;
   DirectLight direct = DirectLight::Apart;
-  /// Of Mode::Chain: a rejected small step is followed by a second one, `second_scale` times its
-  /// scale (Rioux-Lavoie et al. 2020, "Delayed rejection Metropolis light transport"; Tierney and
-  /// Mira 1999; Green and Mira 2001).
-  bool delayed_rejection = false;
-  double second_scale = 0.2;
+  DelayedRejection delayed_rejection;
   /// Of Mode::Chain: a pilot tunes the scale of small steps until so many of them are accepted; 0:
   /// it is as given.
   double target_acceptance = 0;
@@ -188,6 +194,8 @@ struct PrimaryOptions {
   /// Sizes between which small steps are drawn log-uniformly (Kelemen et al. 2002).
   double step_min = 1.0 / 1024.0;
   double step_max = 1.0 / 64.0;
+  /// The second step is of the sizes of Kelemen et al. times its scale.
+  DelayedRejection delayed_rejection;
   DirectLight direct = DirectLight::Apart;
   /// Independent chains, whatever the number of threads.
   int chains = 128;
@@ -212,10 +220,6 @@ enum class StrategyLargeSteps {
 /// Of one strategy at a time, which is a coordinate (Hachisuka et al. 2014).
 struct MmltOptions : PrimaryOptions {
   StrategyLargeSteps large_steps = StrategyLargeSteps::All;
-  /// A small step that is rejected is followed by a second one, of the sizes of isotropic steps
-  /// times `second_scale` (Rioux-Lavoie et al. 2020).
-  bool delayed_rejection = false;
-  double second_scale = 0.2;
 
   /// Throws OptionError.
   void validate() const;
@@ -276,6 +280,7 @@ struct PerturbationOptions {
   /// the angle that so much of the field of view is.
   double step_min = 1.0 / 2048.0;
   double step_max = 1.0 / 10.0;
+  DelayedRejection delayed_rejection;
   DirectLight direct = DirectLight::Apart;
   /// Longest path, in edges.
   int max_depth = 12;

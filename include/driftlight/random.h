@@ -63,6 +63,13 @@ class Rng {
     return normal_(engine_);
   }
 
+  /// A generator of its own, by two numbers of this one.
+  Rng fork() {
+    assert(source_ == nullptr);
+    const std::uint64_t key = engine_();
+    return Rng(mixed(key), engine_());
+  }
+
  private:
   /// PCG's own streams differ in the increment of one linear generator, so the n-th states of
   /// consecutive streams are an arithmetic progression, and so are those of consecutive seeds:

@@ -94,6 +94,7 @@ struct LevelFigures {
   double ratio = 0;
   double squared_ratio = 0;
   KernelStatistics steps;
+  KernelStatistics second_steps;  ///< those that follow a rejected one
   Rejections rejections;
 
   LevelFigures& operator+=(const LevelFigures& other);

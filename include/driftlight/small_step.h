@@ -30,6 +30,10 @@ struct ChainState {
 /// True for Ok; what made a proposal fail is counted.
 bool succeeded(TraceStatus status, Rejections& rejections);
 
+/// pi(y) p(x|y) / (pi(x) p(y|x)) (E63.6); 0 if anything is NaN.
+double acceptance_ratio(double log_target_from, double log_target_to, double log_pdf_forward,
+                        double log_pdf_reverse);
+
 /// log of the acceptance probability min(1, pi(y) p(x|y) / (pi(x) p(y|x))) (E63.6); -infinity if
 /// anything is NaN.
 double log_acceptance(double log_target_from, double log_target_to, double log_pdf_forward,
@@ -56,7 +60,13 @@ struct LogDensities {
 /// Proposals of the kernel (E63.3), whatever the target of the chain: its states carry light.
 class SmallStep {
  public:
-  SmallStep(const Scene& scene, const KernelOptions& options) : scene_(scene), options_(options) {}
+  /// With delayed rejection second steps have so many times the scale of the first. Both references
+  /// must outlive it.
+  SmallStep(const Scene& scene, const KernelOptions& options,
+            std::optional<double> second_scale = std::nullopt)
+      : scene_(scene), options_(options), second_scale_(second_scale) {}
+
+  bool delays_rejection() const { return second_scale_.has_value(); }
 
   /// Shows the probe, unless it is null, each state whose step is prepared from now on.
   void observe(GradientProbe* probe) { probe_ = probe; }
@@ -64,9 +74,8 @@ class SmallStep {
   /// Draws a step from `from` and traces and evaluates where it leads; what makes it fail is
   /// counted.
   bool propose(ChainState& from, ChainState& to, Rng& rng, Rejections& rejections);
-  /// The same by a second step from the same state, `factor` times the scale of the one before.
-  bool propose_again(ChainState& from, ChainState& to, double factor, Rng& rng,
-                     Rejections& rejections);
+  /// The same by a second step from the same state.
+  bool propose_again(ChainState& from, ChainState& to, Rng& rng, Rejections& rejections);
   /// Those of the step just proposed; none if either is 0.
   std::optional<LogDensities> log_densities(ChainState& from, ChainState& to,
                                             Rejections& rejections);
@@ -82,6 +91,7 @@ class SmallStep {
 
   const Scene& scene_;
   const KernelOptions& options_;
+  std::optional<double> second_scale_;
   GradientProbe* probe_ = nullptr;
   double first_scale_ = 0;
   double scale_ = 0;  ///< of the step just proposed
