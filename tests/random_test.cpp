@@ -25,6 +25,13 @@ constexpr std::array kSkipped{0, 1, 5, 20};
 /// counts from what is expected, in units of its square root.
 using Deviations = std::array<double, kCells>;
 
+Deviations to_deviations(const std::array<int, kCells>& counts) {
+  Deviations result{};
+  for (std::size_t i = 0; i < kCells; ++i)
+    result[i] = (counts[i] - kExpected) / std::sqrt(kExpected);
+  return result;
+}
+
 Deviations deviations(std::uint64_t seed, Stream purpose, int skipped) {
   std::array<int, kCells> counts{};
   for (std::uint64_t i = 0; i < kStreams; ++i) {
@@ -33,10 +40,7 @@ Deviations deviations(std::uint64_t seed, Stream purpose, int skipped) {
     const Vec2d xy = kSide * rng.uniform2();
     ++counts[kSide * static_cast<std::size_t>(xy.x()) + static_cast<std::size_t>(xy.y())];
   }
-  Deviations result{};
-  for (std::size_t i = 0; i < kCells; ++i)
-    result[i] = (counts[i] - kExpected) / std::sqrt(kExpected);
-  return result;
+  return to_deviations(counts);
 }
 
 double mean_product(const Deviations& a, const Deviations& b) {
@@ -94,6 +98,32 @@ TEST(Rng, PurposesAreIndependent) {
                           deviations(run, Stream::Chain, skipped));
     EXPECT_NEAR(sum / kRuns, 0, kSigmas * products_error(kRuns * kCells)) << skipped;
   }
+}
+
+/// Of x, the number that follows a fork, and y, its own first one.
+Deviations deviations_of_forks(std::uint64_t seed) {
+  Rng rng(seed, Stream::Test, 0);
+  std::array<int, kCells> counts{};
+  for (int i = 0; i < kStreams; ++i) {
+    Rng fork = rng.fork();
+    const auto x = static_cast<std::size_t>(kSide * rng.uniform());
+    ++counts[kSide * x + static_cast<std::size_t>(kSide * fork.uniform())];
+  }
+  return to_deviations(counts);
+}
+
+TEST(Rng, ForksAreIndependent) {
+  double sum = 0;
+  double product = 0;
+  Deviations last = deviations_of_forks(0);
+  for (int run = 1; run <= kRuns; ++run) {
+    const Deviations next = deviations_of_forks(run);
+    sum += mean_product(next, next);
+    product += mean_product(last, next);
+    last = next;
+  }
+  EXPECT_NEAR(sum / kRuns, 1, kSigmas * squares_error(kRuns * kCells));
+  EXPECT_NEAR(product / kRuns, 0, kSigmas * products_error(kRuns * kCells));
 }
 
 TEST(Rng, SameStreamSameNumbers) {
