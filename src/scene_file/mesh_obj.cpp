@@ -3,6 +3,7 @@
 
 #include <tbb/parallel_pipeline.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <fstream>
@@ -33,9 +34,10 @@ class ObjReader {
  public:
   /// Of a file of so many bytes.
   ObjReader(const ObjOptions& options, std::uintmax_t file_size) : options_(options) {
-    // A line is mostly longer. Memory that is reserved and not used costs nothing; what grows is
-    // touched twice.
-    const std::size_t lines = file_size / 32;
+    // A line is mostly longer. Memory that is reserved and not used costs nothing, up to a limit;
+    // what grows is touched twice.
+    constexpr std::size_t kMost = std::size_t{1} << 26U;
+    const std::size_t lines = std::min<std::size_t>(file_size / 32, kMost);
     positions_.reserve(lines);
     seen_.reserve(lines);
     mesh_.positions.reserve(lines);
@@ -230,7 +232,8 @@ ObjFile read_obj(const std::filesystem::path& file, const ObjOptions& options) {
   if (!stream || std::filesystem::is_directory(file))
     throw InputError("the mesh '" + file.string() + "' cannot be opened");
   try {
-    return read_portions(stream, std::filesystem::file_size(file), options);
+    const bool has_size = std::filesystem::is_regular_file(file);  // a pipe has none
+    return read_portions(stream, has_size ? std::filesystem::file_size(file) : 0, options);
   } catch (const LineError& error) {
     std::ifstream again(file, std::ios::binary);
     const std::string text{std::istreambuf_iterator<char>(again), std::istreambuf_iterator<char>()};
