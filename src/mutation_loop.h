@@ -43,6 +43,20 @@ inline double second_acceptance(double ratio, double first, double ghost) {
   return ghost < 1.0 ? std::min(1.0, ratio * ((1.0 - ghost) / (1.0 - first))) : 0.0;
 }
 
+/// Proposes z from x, whose first proposal was refused though accepted with probability `first`,
+/// and the ghost of z by that proposal's numbers. Returns the probability of accepting z. `propose`
+/// is as below.
+template <class State, class Propose>
+double propose_second(State& x, State& z, State& ghost, double first, Rng& rng, Rng& first_numbers,
+                      Rejections& rejections, const Propose& propose) {
+  const double ratio = propose(x, z, MutationStage::Second, rng, rejections);
+  if (!(ratio > 0.0)) return 0.0;
+  Rejections of_ghost;  // it is no proposal
+  const double to_ghost =
+      std::min(1.0, propose(z, ghost, MutationStage::Ghost, first_numbers, of_ghost));
+  return second_acceptance(ratio, first, to_ghost);
+}
+
 /// How a chain runs.
 struct MutationRun {
   std::uint64_t mutations;
@@ -84,17 +98,6 @@ State& run_mutations(State& start, std::array<State, 3>& memory, const MutationR
     figures.small_step.accepted += acceptance;
     return acceptance;
   };
-  const auto propose_second = [&](double first, Rng& numbers) {
-    const double ratio = propose(*from, *second, MutationStage::Second, rng, figures.rejections);
-    Rejections of_ghost;
-    const double ghost =
-        ratio > 0.0 ? std::min(1.0, propose(*second, *to, MutationStage::Ghost, numbers, of_ghost))
-                    : 0.0;
-    const double acceptance = second_acceptance(ratio, first, ghost);
-    ++figures.second_step.proposed;
-    figures.second_step.accepted += acceptance;
-    return acceptance;
-  };
   for (std::uint64_t i = 0; i < run.mutations; ++i) {
     if (!run.delayed_rejection) {
       settle(to, propose_first(rng));
@@ -107,7 +110,11 @@ State& run_mutations(State& start, std::array<State, 3>& memory, const MutationR
       move(to, 1.0);
     } else {
       if (first > 0.0) ++figures.rejections.hastings;
-      settle(second, propose_second(first, again));
+      const double acceptance =
+          propose_second(*from, *second, *to, first, rng, again, figures.rejections, propose);
+      ++figures.second_step.proposed;
+      figures.second_step.accepted += acceptance;
+      settle(second, acceptance);
     }
   }
   if (gathered > 0.0) visit(*from, gathered);

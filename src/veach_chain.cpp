@@ -54,11 +54,16 @@ double VeachChain::propose_bidirectional() {
 }
 
 void VeachChain::take_delayed_step() {
+  const auto propose = [&](const VertexPath& x, VertexPath& y, MutationStage stage, Rng& numbers,
+                           Rejections& rejections) {
+    const double size = stage == MutationStage::Second ? delayed_rejection_.second_scale : 1.0;
+    return mutation_.propose(x, y, size, numbers, rejections);
+  };
   Rng numbers = rng_.fork();
   Rng again = numbers;
   Rejections& rejections = statistics_.rejections;
   const double first =
-      std::min(1.0, mutation_.propose(current(), proposed(), 1.0, numbers, rejections));
+      std::min(1.0, propose(current(), proposed(), MutationStage::First, numbers, rejections));
   ++statistics_.small_step.proposed;
   statistics_.small_step.accepted += first;
   if (rng_.uniform() < first) {
@@ -66,14 +71,8 @@ void VeachChain::take_delayed_step() {
     return;
   }
   if (first > 0.0) ++rejections.hastings;
-  VertexPath& second = paths_[second_];
-  const double ratio =
-      mutation_.propose(current(), second, delayed_rejection_.second_scale, rng_, rejections);
-  Rejections of_ghost;
-  const double ghost =
-      ratio > 0.0 ? std::min(1.0, mutation_.propose(second, proposed(), 1.0, again, of_ghost))
-                  : 0.0;
-  const double acceptance = second_acceptance(ratio, first, ghost);
+  const double acceptance = propose_second(current(), paths_[second_], proposed(), first, rng_,
+                                           again, rejections, propose);
   ++statistics_.second_step.proposed;
   statistics_.second_step.accepted += acceptance;
   if (!resolve(acceptance, second_) && acceptance > 0.0) ++rejections.hastings;
