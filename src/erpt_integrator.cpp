@@ -38,7 +38,8 @@ struct Energy {
         options(with),
         unguided(scene),
         min_edges(options.direct == DirectLight::Apart ? kDirectDepth + 1 : 1),
-        mutation(scene, {min_edges, options.max_depth, options.step_min, options.step_max}),
+        mutation(scene, {min_edges, options.max_depth, options.step_min, options.step_max,
+                         options.manifold_probability}),
         film(scene.camera().film_width, scene.camera().film_height, scene.camera().filter),
         deposit(mean_of_samples(seed) / options.mutations_per_sample),
         unit(1024.0 * (deposit > 0.0 ? deposit : 1.0)) {}

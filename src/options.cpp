@@ -369,6 +369,8 @@ std::vector<OptionEntry> perturbation_entries(PerturbationOptions& options,
                                               std::vector<OptionEntry> first,
                                               const std::vector<OptionEntry>& last) {
   const Range<double> size{.low = 0, .high = 1, .open = true};
+  first.push_back(number("manifold_probability", options.manifold_probability, Range<double>{0, 1},
+                         "share of the perturbations that find smooth and narrow vertices again"));
   first.push_back(number("step_min", options.step_min, size,
                          "least step of a perturbation, in widths of the film, at most step_max"));
   first.push_back(number("step_max", options.step_max, size, "largest step of a perturbation"));

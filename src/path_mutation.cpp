@@ -35,61 +35,6 @@ double deletion_probability(int edges, int deleted) {
 /// Of changing a number by so much; not normalised.
 double change_weight(int change) { return std::ldexp(1.0, -std::abs(change)); }
 
-/// At the angle to the axis, anywhere around it.
-Vec3d tilted(const Vec3d& axis, double angle, Rng& rng) {
-  const double phi = 2.0 * kPi * rng.uniform();
-  const double sine = std::sin(angle);
-  return to_world({sine * std::cos(phi), sine * std::sin(phi), std::cos(angle)}, axis);
-}
-
-RayFollower leaving(const Scene& scene, const SurfaceHit& x, const Vec3d& v) {
-  return {scene, x.at.p, scene.leave(x.at.p, x.at.n_g, v), v};
-}
-
-/// The ray meets a surface that scatters. Missed, if it does not.
-TraceStatus meet(RayFollower& ray, SurfaceHit& surface) {
-  const Hit hit = ray.next_hit();
-  if (!hit.valid()) return TraceStatus::Missed;
-  surface = ray.surface(hit);
-  // A ray that just touches a sphere in single precision may pass it in double.
-  return surface.bsdf != nullptr && surface.at.p.allFinite() ? TraceStatus::Ok
-                                                             : TraceStatus::Missed;
-}
-
-/// The last new vertex of the lens or multi-chain perturbation.
-int last_from_sensor(const VertexPath& x) {
-  for (int k = 1; k < x.edges; ++k)
-    if (!x(k).delta && (k + 1 == x.edges || !x(k + 1).delta)) return k;
-  return x.edges;
-}
-
-/// x_m of the caustic perturbation.
-int first_of_caustic(const VertexPath& x) {
-  int m = 2;
-  while (m < x.edges && x(m).delta) ++m;
-  return m;
-}
-
-double log_lens(const VertexPath& x) {
-  double sum = x.log_importance();
-  for (int k = last_from_sensor(x); k > 0; --k) sum += x.log_arriving(k);
-  return sum;
-}
-
-double log_caustic(const VertexPath& x) {
-  double sum = 0;
-  for (int k = first_of_caustic(x) - 1; k > 0; --k) {
-    sum += x.log_leaving(k);
-    if (k > 1) sum += x.log_spread(k);
-  }
-  return sum;
-}
-
-/// Copies x_first .. x_last.
-void copy_vertices(const VertexPath& x, int first, int last, VertexPath& y, int shift = 0) {
-  for (int k = first; k <= last; ++k) y(k + shift) = x(k);
-}
-
 }  // namespace
 
 double acceptance_ratio(double log_pi_x, double log_pi_y, const MutationDensities& densities,
@@ -103,7 +48,7 @@ double acceptance_ratio(double log_pi_x, double log_pi_y, const MutationDensitie
 }
 
 PathMutation::PathMutation(const Scene& scene, const MutationLimits& limits)
-    : scene_(scene), limits_(limits) {}
+    : scene_(scene), limits_(limits), walk_(scene) {}
 
 // ---- Bidirectional ----------------------------------------------------------------------------
 
@@ -167,8 +112,8 @@ TraceStatus PathMutation::bidirectional(const VertexPath& x, VertexPath& y,
 TraceStatus PathMutation::regrow(const VertexPath& x, const KeptEnds& kept, int from_sensor,
                                  int from_light, VertexPath& y, Rng& rng) const {
   y.edges = kept.sensor + kept.light + from_sensor + from_light - 1;
-  copy_vertices(x, 1, kept.sensor - 1, y);
-  copy_vertices(x, x.edges - kept.light + 1, x.edges - 1, y, y.edges - x.edges);
+  y.take(x, 1, kept.sensor - 1);
+  y.take(x, x.edges - kept.light + 1, x.edges - 1, y.edges - x.edges);
   if (kept.light > 0) y.end = x.end;
   const int joint = kept.sensor + from_sensor;
   const bool hits = joint > y.edges;
@@ -291,121 +236,6 @@ TraceStatus PathMutation::joined(const VertexPath& y, int k) const {
         !scene_.occluded(scene_.leave(a.p, a.n_g, edge), scene_.leave(b.p, b.n_g, Vec3d(-edge)));
   }
   return clear ? TraceStatus::Ok : TraceStatus::Occluded;
-}
-
-// ---- Perturbations ----------------------------------------------------------------------------
-
-double PathMutation::draw_step(double size, Rng& rng) const {
-  return size * limits_.step_max *
-         std::exp(rng.uniform() * std::log(limits_.step_min / limits_.step_max));
-}
-
-TraceStatus PathMutation::arrive_as(const VertexPath& x, int k, RayFollower& ray,
-                                    VertexPath& y) const {
-  y(k) = x(k);
-  const TraceStatus status = meet(ray, y(k).surface);
-  if (status != TraceStatus::Ok) return status;
-  return has_lobe(*y(k).surface.bsdf, x(k).lobe()) ? TraceStatus::Ok : TraceStatus::OtherLobe;
-}
-
-TraceStatus PathMutation::follow_delta(const VertexPath& y, int k, RayFollower& ray) const {
-  const SurfaceHit& at = y(k).surface;
-  const Vec3d next = delta_direction(*at.bsdf, at.surface(), at.wi, y(k).scattering);
-  if (!next.allFinite()) return TraceStatus::OtherLobe;  // total reflection
-  if (at.side(next) != y(k).scattering) return TraceStatus::OtherLobe;
-  if (!passes(at.at, at.wi, next)) return TraceStatus::Missed;
-  ray.leave(at, next);
-  return TraceStatus::Ok;
-}
-
-TraceStatus PathMutation::from_sensor(const VertexPath& x, VertexPath& y,
-                                      MutationDensities& densities, Rng& rng, double size) const {
-  const Camera& camera = scene_.camera();
-  const double angle_of_step = 2.0 * std::atan(camera.half_width);
-  const double r = draw_step(size, rng);
-  const double phi = 2.0 * kPi * rng.uniform();
-  const Vec2d film =
-      x.contribution().film +
-      r * Vec2d(std::cos(phi), std::sin(phi) * camera.half_width / camera.half_height);
-  if (!(film.array() >= 0.0).all() || !(film.array() < 1.0).all()) return TraceStatus::Missed;
-
-  y.edges = x.edges;
-  const int last = last_from_sensor(x);
-  RayFollower ray(scene_, camera.direction(film), camera.origin);
-  TraceStatus status = TraceStatus::Ok;
-  for (int k = 1; k <= last && k < x.edges; ++k) {
-    status = arrive_as(x, k, ray, y);
-    if (status != TraceStatus::Ok) return status;
-    if (k == last) break;
-    if (x(k).delta) {
-      status = follow_delta(y, k, ray);
-      if (status != TraceStatus::Ok) return status;
-    } else {
-      ray.leave(y(k).surface, tilted(x.toward_light(k), angle_of_step * draw_step(size, rng), rng));
-    }
-  }
-  if (last == x.edges) {
-    status = end_by_hit(y, ray);
-  } else {
-    copy_vertices(x, last + 1, x.edges - 1, y);
-    y.end = x.end;
-    status = joined(y, last + 1);
-  }
-  if (status != TraceStatus::Ok) return status;
-  if (!y.evaluate(scene_)) return TraceStatus::Missed;
-  densities = {log_lens(y), log_lens(x)};
-  return TraceStatus::Ok;
-}
-
-bool PathMutation::has_caustic(const VertexPath& x) { return x.edges > 1 && !x(1).delta; }
-
-TraceStatus PathMutation::perturb(const VertexPath& x, VertexPath& y, MutationDensities& densities,
-                                  Rng& rng, double size) const {
-  return has_caustic(x) && rng.uniform() < 0.5 ? caustic(x, y, densities, rng, size)
-                                               : from_sensor(x, y, densities, rng, size);
-}
-
-double PathMutation::propose(const VertexPath& x, VertexPath& y, double size, Rng& rng,
-                             Rejections& rejections) const {
-  MutationDensities densities;
-  if (!succeeded(perturb(x, y, densities, rng, size), rejections)) return 0.0;
-  return acceptance_ratio(x.contribution().log_target, y.contribution().log_target, densities,
-                          rejections);
-}
-
-/// The ray from x_m toward the sensor, moved.
-RayFollower PathMutation::moved_from_light(const VertexPath& x, int m, double size,
-                                           Rng& rng) const {
-  const double angle = 2.0 * std::atan(scene_.camera().half_width) * draw_step(size, rng);
-  if (m == x.edges && x.end.at_infinity()) {
-    const Vec3d& toward = x.end.p;
-    const Vec3d across = tangent_basis(toward).t;
-    const Vec3d offset = angle * scene_.radius() *
-                         (Eigen::AngleAxisd(2.0 * kPi * rng.uniform(), toward) * across).eval();
-    const Vec3d origin = x(m - 1).surface.at.p + offset + 2.0 * scene_.radius() * toward;
-    return {scene_, origin, origin, Vec3d(-toward)};
-  }
-  const Vec3d v = tilted(Vec3d(-x.toward_light(m - 1)), angle, rng);
-  if (m < x.edges) return leaving(scene_, x(m).surface, v);
-  const bool area = x.end.kind == LightEnd::Kind::Area;
-  return {scene_, x.end.p, area ? scene_.leave(x.end.p, x.end.n, v) : x.end.p, v};
-}
-
-TraceStatus PathMutation::caustic(const VertexPath& x, VertexPath& y, MutationDensities& densities,
-                                  Rng& rng, double size) const {
-  const int m = first_of_caustic(x);
-  y.edges = x.edges;
-  copy_vertices(x, m, x.edges - 1, y);
-  y.end = x.end;
-  RayFollower ray = moved_from_light(x, m, size, rng);
-  for (int k = m - 1; k > 0; --k) {
-    TraceStatus status = arrive_as(x, k, ray, y);
-    if (status == TraceStatus::Ok) status = k > 1 ? follow_delta(y, k, ray) : joined(y, 1);
-    if (status != TraceStatus::Ok) return status;
-  }
-  if (!y.evaluate(scene_)) return TraceStatus::Missed;
-  densities = {log_caustic(y), log_caustic(x)};
-  return TraceStatus::Ok;
 }
 
 }  // namespace driftlight

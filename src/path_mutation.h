@@ -20,11 +20,17 @@
 ///   x_2, .. that does so, or the emitter. The direction at x_m toward the sensor moves (of light
 ///   from infinity its place across it), the ray follows the delta lobes of x to a new x_1, which
 ///   is joined to the sensor.
+/// - Manifold (Jakob and Marschner 2012): x_b is any vertex that scatters otherwise than by a delta
+///   lobe; x_a and x_c are the next ones on its two sides that are not held (manifold_walk.h), or
+///   the path's ends. The direction at x_a toward x_b moves, the ray follows the held vertices to a
+///   new x_b, and those between it and x_c, which stays, are found again.
 /// Moves are isotropic, by a step whose density depends on its size alone; it cancels. What is left
 /// of T(y | x) are the factors that turn film, solid angle and delta lobes into area,
 ///   lens, multi-chain   W(v_0) prod |n_g . wi|_k / r_k^2           over the new x_1 .. x_j
 ///   caustic             prod |n_g . wo|_k / r_(k+1)^2  prod J_k    over the new x_k, and the delta
-///                                                                  ones among them but for x_m.
+///                                                                  ones among them but for x_m,
+///   manifold            one of these over the new x_k up to x_b, at narrow lobes |dh / dwo| or
+///                       |dh / dwi| in the place of 1 and J, and the density of manifold_walk.h.
 /// These keep the lobes of x, and so may be told apart by them.
 #pragma once
 
@@ -33,6 +39,7 @@
 #include "driftlight/phase_space.h"
 #include "driftlight/random.h"
 #include "driftlight/render.h"
+#include "manifold_walk.h"
 #include "vertex_path.h"
 
 namespace driftlight {
@@ -44,6 +51,8 @@ struct MutationLimits {
   /// Sizes between which steps are drawn log-uniformly, in widths of the film.
   double step_min = 0;
   double step_max = 0;
+  /// Share of the perturbations that are manifold perturbations.
+  double manifold_probability = 0;
 };
 
 /// Vertices that a bidirectional mutation keeps: x_0 .. x_(sensor-1), and the last `light`.
@@ -81,8 +90,13 @@ class PathMutation {
   TraceStatus caustic(const VertexPath& x, VertexPath& y, MutationDensities& densities, Rng& rng,
                       double size = 1.0) const;
   static bool has_caustic(const VertexPath& x);
-  /// One of the perturbations of x, the two equally likely where it has both. They keep what this
-  /// depends on, so each kind is in detailed balance by itself.
+  /// The manifold perturbation, of a path that has it.
+  TraceStatus manifold(const VertexPath& x, VertexPath& y, MutationDensities& densities, Rng& rng,
+                       double size = 1.0) const;
+  static bool has_manifold(const VertexPath& x);
+  /// One of the perturbations of x, the manifold perturbation with the probability of the limits,
+  /// the two others equally likely where it has both. They keep what this depends on, so each kind
+  /// is in detailed balance by itself.
   TraceStatus perturb(const VertexPath& x, VertexPath& y, MutationDensities& densities, Rng& rng,
                       double size = 1.0) const;
 
@@ -114,16 +128,25 @@ class PathMutation {
   TraceStatus grow_from_light(VertexPath& y, int last, int count, Rng& rng) const;
   /// The ray meets an emitter, which becomes the end of y.
   TraceStatus end_by_hit(VertexPath& y, RayFollower ray) const;
-  /// The ray meets vertex k of y, which has the lobe of x there.
-  TraceStatus arrive_as(const VertexPath& x, int k, RayFollower& ray, VertexPath& y) const;
-  /// The ray goes on by the delta lobe of vertex k of y.
-  TraceStatus follow_delta(const VertexPath& y, int k, RayFollower& ray) const;
   TraceStatus joined(const VertexPath& y, int k) const;
   double draw_step(double size, Rng& rng) const;
+  /// Of a direction that moves by such a step.
+  double draw_angle(double size, Rng& rng) const;
+  std::optional<Vec2d> moved_film(const VertexPath& x, double size, Rng& rng) const;
   RayFollower moved_from_light(const VertexPath& x, int m, double size, Rng& rng) const;
+  /// x_a stays and the direction there moves, up to x_b, from which x_c is found again.
+  struct ManifoldSpan {
+    int a, b, c;
+  };
+  /// The ray from x_a toward x_b, moved; none beside the film.
+  std::optional<RayFollower> moved(const VertexPath& x, const ManifoldSpan& span, double size,
+                                   Rng& rng) const;
+  ManifoldSpan draw_span(const VertexPath& x, Rng& rng) const;
+  double log_manifold(const VertexPath& x, const ManifoldSpan& span) const;
 
   const Scene& scene_;
   MutationLimits limits_;
+  ManifoldWalk walk_;
 };
 
 }  // namespace driftlight

@@ -8,7 +8,7 @@ namespace {
 
 MutationLimits limits(int max_depth) {
   const PerturbationOptions steps;
-  return {1, max_depth, steps.step_min, steps.step_max};
+  return {1, max_depth, steps.step_min, steps.step_max, 0.0};
 }
 
 }  // namespace

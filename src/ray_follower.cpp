@@ -3,6 +3,19 @@
 
 namespace driftlight {
 
+RayFollower leaving(const Scene& scene, const SurfaceHit& x, const Vec3d& v) {
+  return {scene, x.at.p, scene.leave(x.at.p, x.at.n_g, v), v};
+}
+
+TraceStatus meet(RayFollower& ray, SurfaceHit& surface) {
+  const Hit hit = ray.next_hit();
+  if (!hit.valid()) return TraceStatus::Missed;
+  surface = ray.surface(hit);
+  // A ray that just touches a sphere in single precision may pass it in double.
+  return surface.bsdf != nullptr && surface.at.p.allFinite() ? TraceStatus::Ok
+                                                             : TraceStatus::Missed;
+}
+
 TraceStatus connection_status(const Scene& scene, const SurfaceHit& from, const Emitter& emitter,
                               const EmitterPoint& y) {
   const Vec3d edge = y.p - from.at.p;

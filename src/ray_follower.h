@@ -75,6 +75,10 @@ class RayFollower {
   double t_max_;
 };
 
+/// The ray that leaves a surface point along v.
+RayFollower leaving(const Scene& scene, const SurfaceHit& x, const Vec3d& v);
+/// The ray meets a surface that scatters; Missed, if it does not.
+TraceStatus meet(RayFollower& ray, SurfaceHit& surface);
 /// Whether light passes straight from the point y of a point, spot or area emitter to a surface
 /// point. Missed: the point lies outside of a spot's cone, y shows its back, or something that is
 /// not y is seen in its direction on the same shape.

@@ -26,7 +26,8 @@ struct VeachChains {
   VeachChains(const Scene& scene, const MltOptions& with, const RenderOptions& render,
               int min_edges, Film& film)
       : options(with),
-        mutation(scene, {min_edges, options.max_depth, options.step_min, options.step_max}) {
+        mutation(scene, {min_edges, options.max_depth, options.step_min, options.step_max,
+                         options.manifold_probability}) {
     if (min_edges > options.max_depth) return;
     PathSampler sampler(scene, options.max_depth, LargeSteps::Bdpt, min_edges,
                         PhaseSpace::Bidirectional);

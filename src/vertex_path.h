@@ -51,6 +51,16 @@ class VertexPath {
   Vertex& operator()(int k) { return vertices_[static_cast<std::size_t>(k - 1)]; }
   const Vertex& operator()(int k) const { return vertices_[static_cast<std::size_t>(k - 1)]; }
 
+  /// Copies x_first .. x_last of another path, so many places further on.
+  void take(const VertexPath& x, int first, int last, int shift = 0) {
+    for (int k = first; k <= last; ++k) (*this)(k + shift) = x(k);
+  }
+  /// x_k, 0 <= k <= n; the direction of an end at infinity.
+  const Vec3d& position(const Scene& scene, int k) const {
+    if (k == edges) return end.p;
+    return k == 0 ? scene.camera().origin : (*this)(k).surface.at.p;
+  }
+
   /// Takes down all that follows from the vertices; to be called when they have changed. False if
   /// the path carries no light. Whether its edges are free is not its concern.
   bool evaluate(const Scene& scene);

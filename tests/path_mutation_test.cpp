@@ -337,6 +337,11 @@ const std::vector<Kind>& kinds() {
        [](const auto& by, const auto& x, auto& y, auto& t, auto& rng) {
          return PathMutation::has_caustic(x) ? by.caustic(x, y, t, rng) : TraceStatus::OtherLobe;
        },
+       true},
+      {"manifold",
+       [](const auto& by, const auto& x, auto& y, auto& t, auto& rng) {
+         return PathMutation::has_manifold(x) ? by.manifold(x, y, t, rng) : TraceStatus::OtherLobe;
+       },
        true}};
   return kKinds;
 }

@@ -274,8 +274,11 @@ struct MalaOptions : GaussianStepOptions {
   void validate() const;
 };
 
-/// Mutations of a path by its vertices (Veach and Guibas 1997): steps of the perturbations.
+/// Mutations of a path by its vertices (Veach and Guibas 1997): the perturbations and their steps.
 struct PerturbationOptions {
+  /// Share of the perturbations that are manifold perturbations (Jakob and Marschner 2012), where
+  /// the path has one.
+  double manifold_probability = 0.5;
   /// Sizes between which they are drawn log-uniformly, in widths of the film; directions move by
   /// the angle that so much of the field of view is.
   double step_min = 1.0 / 2048.0;
