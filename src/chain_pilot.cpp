@@ -128,7 +128,7 @@ class Sampler {
         splitting_(splitting),
         tracer_(scene, pilot.guide, MisHeuristic::Power, options.max_depth),
         langevin_(scene, options.kernel, options.delayed_rejection, remainder, nullptr),
-        perturbed_(scene, options.delayed_rejection, remainder, options.max_depth),
+        perturbed_(scene, options.delayed_rejection, remainder, options.max_depth, kChainManifolds),
         light_(light) {}
 
   Sample run(const Vec2d& film, Rng& rng) {
@@ -172,7 +172,8 @@ class Sampler {
     const double probability = both ? 0.5 * chosen : chosen;
     const Spread stays{1.0 / probability, 1.0 / probability, 1.0 / probability};
     if (both ? rng_->uniform() < 0.5 : choices_.perturbs()) {
-      bright.perturbed = perturbed_.start_at(path) ? spread(film, probability, perturbed_) : stays;
+      bright.perturbed =
+          perturbed_.start_at(vertex_path(path)) ? spread(film, probability, perturbed_) : stays;
       return;
     }
     const auto start = remainder_.bright_path(path, options_.phase_space);

@@ -19,7 +19,7 @@ constexpr int kMaxHalvings = 5;
 /// Of a step of Newton's method, in radians.
 constexpr double kLongestStep = 0.5;
 /// In units of the scene's radius, or radians.
-constexpr double kConverged = 1e-10;
+constexpr double kConverged = 1e-8;
 constexpr double kSame = 1e-6;
 
 int step_toward(int from, int to) { return to > from ? 1 : -1; }
@@ -213,16 +213,21 @@ TraceStatus ManifoldWalk::solve(const VertexPath& x, const Lobes& lobes, int fro
 }
 
 TraceStatus ManifoldWalk::connect(const VertexPath& x, int from, int to, VertexPath& y) const {
+  if (from + step_toward(from, to) == to) return TraceStatus::Ok;
+  return solve(x, lobes_between(x, from, to), from, to, y);
+}
+
+bool ManifoldWalk::leads_back(const VertexPath& y, int from, int to, const VertexPath& x) const {
   const int next = from + step_toward(from, to);
-  if (next == to) return TraceStatus::Ok;
-  const Lobes lobes = lobes_between(x, from, to);
-  const TraceStatus status = solve(x, lobes, from, to, y);
-  if (status != TraceStatus::Ok) return status;
-  VertexPath back = y;
-  back(from) = x(from);
-  if (solve(y, lobes, from, to, back) != TraceStatus::Ok) return TraceStatus::Missed;
-  const double distance = (back(next).surface.at.p - x(next).surface.at.p).norm();
-  return distance < kSame * scene_.radius() ? TraceStatus::Ok : TraceStatus::Missed;
+  if (next == to) return true;
+  VertexPath found;
+  found.edges = x.edges;
+  found.end = x.end;
+  found(from) = x(from);
+  if (to > 0 && to < x.edges) found(to) = x(to);
+  if (solve(y, lobes_between(y, from, to), from, to, found) != TraceStatus::Ok) return false;
+  const double distance = (found(next).surface.at.p - x(next).surface.at.p).norm();
+  return distance < kSame * scene_.radius();
 }
 
 double ManifoldWalk::log_density(const VertexPath& path, int p, int q) const {

@@ -59,9 +59,11 @@ class ManifoldWalk {
                            VertexPath& y) const;
 
   /// Finds those vertices for x_from, a surface, and x_to of y, which may be the sensor or the end.
-  /// That from y to x the same walk leads back is made sure of. The last edge may be hidden.
-  /// Missed: there are none, or they were not found.
+  /// The last edge may be hidden. Missed: there are none, or they were not found.
   TraceStatus connect(const VertexPath& x, int from, int to, VertexPath& y) const;
+  /// Whether connect, from y, finds the vertices of x: a proposal that has no way back must be
+  /// refused. Both are evaluated.
+  bool leads_back(const VertexPath& y, int from, int to, const VertexPath& x) const;
 
   /// log of the density of the vertices between p and q, p < q, of a path that is evaluated. 0 if
   /// there are none.

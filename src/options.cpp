@@ -199,6 +199,9 @@ std::vector<OptionEntry> splitting_entries(SplittingOptions& options) {
              "trust of the steps of particles"),
       number("last_steps", options.last_steps, Range<int>{1, 1000000},
              "steps of a particle in the scene itself"),
+      number_or_auto("last_perturbations", options.last_perturbations, Range<double>{0, 1},
+                     "share of the particles whose steps there are perturbations of mlt; auto: 1 "
+                     "with a pinhole, else 0"),
       number("splitting_pilot", options.pilot, Range<int>{64, 1000000000},
              "samples of each round of the pilot that finds what particles are worth"),
   };
@@ -369,8 +372,10 @@ std::vector<OptionEntry> perturbation_entries(PerturbationOptions& options,
                                               std::vector<OptionEntry> first,
                                               const std::vector<OptionEntry>& last) {
   const Range<double> size{.low = 0, .high = 1, .open = true};
-  first.push_back(number("manifold_probability", options.manifold_probability, Range<double>{0, 1},
-                         "share of the perturbations that find smooth and narrow vertices again"));
+  first.push_back(
+      number("manifold_probability", options.manifold_probability, Range<double>{0, 1},
+             "share of the perturbations that find the smooth and narrow vertices beside "
+             "one that moves again, where there are any"));
   first.push_back(number("step_min", options.step_min, size,
                          "least step of a perturbation, in widths of the film, at most step_max"));
   first.push_back(number("step_max", options.step_max, size, "largest step of a perturbation"));

@@ -22,8 +22,9 @@
 ///   is joined to the sensor.
 /// - Manifold (Jakob and Marschner 2012): x_b is any vertex that scatters otherwise than by a delta
 ///   lobe; x_a and x_c are the next ones on its two sides that are not held (manifold_walk.h), or
-///   the path's ends. The direction at x_a toward x_b moves, the ray follows the held vertices to a
-///   new x_b, and those between it and x_c, which stays, are found again.
+///   the path's ends; one at least is not its neighbour, or the others would do. The direction at
+///   x_a toward x_b moves, the ray follows the held vertices to a new x_b, and those between it and
+///   x_c, which stays, are found again.
 /// Moves are isotropic, by a step whose density depends on its size alone; it cancels. What is left
 /// of T(y | x) are the factors that turn film, solid angle and delta lobes into area,
 ///   lens, multi-chain   W(v_0) prod |n_g . wi|_k / r_k^2           over the new x_1 .. x_j
@@ -34,6 +35,7 @@
 /// These keep the lobes of x, and so may be told apart by them.
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include "driftlight/phase_space.h"
@@ -64,6 +66,17 @@ struct KeptEnds {
   int deleted(int edges) const { return edges + 1 - sensor - light; }
 };
 
+/// x_a stays and the direction there moves, up to x_b, from which x_c is found again.
+struct ManifoldSpan {
+  int a = 0, b = 0, c = 0;
+};
+/// Those that a path has, with a < b < c; each may be taken from the other side too.
+struct ManifoldSpans {
+  int count = 0;
+  std::array<ManifoldSpan, kMaxPathLength> all;
+};
+ManifoldSpans manifold_spans(const VertexPath& x);
+
 /// log T(y | x) and log T(x | y), up to a common factor.
 struct MutationDensities {
   double forward = 0;
@@ -93,7 +106,7 @@ class PathMutation {
   /// The manifold perturbation, of a path that has it.
   TraceStatus manifold(const VertexPath& x, VertexPath& y, MutationDensities& densities, Rng& rng,
                        double size = 1.0) const;
-  static bool has_manifold(const VertexPath& x);
+  static bool has_manifold(const VertexPath& x) { return manifold_spans(x).count > 0; }
   /// One of the perturbations of x, the manifold perturbation with the probability of the limits,
   /// the two others equally likely where it has both. They keep what this depends on, so each kind
   /// is in detailed balance by itself.
@@ -134,14 +147,9 @@ class PathMutation {
   double draw_angle(double size, Rng& rng) const;
   std::optional<Vec2d> moved_film(const VertexPath& x, double size, Rng& rng) const;
   RayFollower moved_from_light(const VertexPath& x, int m, double size, Rng& rng) const;
-  /// x_a stays and the direction there moves, up to x_b, from which x_c is found again.
-  struct ManifoldSpan {
-    int a, b, c;
-  };
   /// The ray from x_a toward x_b, moved; none beside the film.
   std::optional<RayFollower> moved(const VertexPath& x, const ManifoldSpan& span, double size,
                                    Rng& rng) const;
-  ManifoldSpan draw_span(const VertexPath& x, Rng& rng) const;
   double log_manifold(const VertexPath& x, const ManifoldSpan& span) const;
 
   const Scene& scene_;

@@ -2,6 +2,7 @@
 /// The perturbations of path_mutation.h.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "path_mutation.h"
 
@@ -156,23 +157,16 @@ TraceStatus PathMutation::caustic(const VertexPath& x, VertexPath& y, MutationDe
 
 // ---- Manifold perturbation --------------------------------------------------------------------
 
-bool PathMutation::has_manifold(const VertexPath& x) {
-  for (int k = 1; k < x.edges; ++k)
-    if (!x(k).delta) return true;
-  return false;
-}
-
-PathMutation::ManifoldSpan PathMutation::draw_span(const VertexPath& x, Rng& rng) const {
-  int count = 0;
-  for (int k = 1; k < x.edges; ++k) count += x(k).delta ? 0 : 1;
-  int skipped = std::min(static_cast<int>(count * rng.uniform()), count - 1);
-  int b = 1;
-  while (x(b).delta || skipped-- > 0) ++b;
-  int before = b - 1;
-  while (before > 0 && is_held(x(before))) --before;
-  int after = b + 1;
-  while (after < x.edges && is_held(x(after))) ++after;
-  return rng.uniform() < 0.5 ? ManifoldSpan{before, b, after} : ManifoldSpan{after, b, before};
+ManifoldSpans manifold_spans(const VertexPath& x) {
+  ManifoldSpans spans;
+  for (int b = 1; b < x.edges; ++b) {
+    if (x(b).delta) continue;
+    ManifoldSpan span{b - 1, b, b + 1};
+    while (span.a > 0 && is_held(x(span.a))) --span.a;
+    while (span.c < x.edges && is_held(x(span.c))) ++span.c;
+    if (span.c - span.a > 2) spans.all[static_cast<std::size_t>(spans.count++)] = span;
+  }
+  return spans;
 }
 
 double PathMutation::log_manifold(const VertexPath& x, const ManifoldSpan& span) const {
@@ -203,7 +197,10 @@ std::optional<RayFollower> PathMutation::moved(const VertexPath& x, const Manifo
 
 TraceStatus PathMutation::manifold(const VertexPath& x, VertexPath& y, MutationDensities& densities,
                                    Rng& rng, double size) const {
-  const ManifoldSpan span = draw_span(x, rng);
+  const ManifoldSpans spans = manifold_spans(x);
+  const int index = std::min(static_cast<int>(spans.count * rng.uniform()), spans.count - 1);
+  ManifoldSpan span = spans.all[static_cast<std::size_t>(index)];
+  if (rng.uniform() < 0.5) std::swap(span.a, span.c);
   y.edges = x.edges;
   y.take(x, 1, x.edges - 1);
   y.end = x.end;
@@ -216,7 +213,7 @@ TraceStatus PathMutation::manifold(const VertexPath& x, VertexPath& y, MutationD
   if (status == TraceStatus::Ok) status = walk_.connect(x, span.b, span.c, y);
   if (status == TraceStatus::Ok) status = joined(y, span.b < span.c ? span.c : span.c + 1);
   if (status != TraceStatus::Ok) return status;
-  if (!y.evaluate(scene_)) return TraceStatus::Missed;
+  if (!y.evaluate(scene_) || !walk_.leads_back(y, span.b, span.c, x)) return TraceStatus::Missed;
   densities = {log_manifold(y, span), log_manifold(x, span)};
   return TraceStatus::Ok;
 }

@@ -6,22 +6,23 @@
 namespace driftlight {
 namespace {
 
-MutationLimits limits(int max_depth) {
+MutationLimits limits(int max_depth, double manifold_probability) {
   const PerturbationOptions steps;
-  return {1, max_depth, steps.step_min, steps.step_max, 0.0};
+  return {1, max_depth, steps.step_min, steps.step_max, manifold_probability};
 }
 
 }  // namespace
 
 PerturbationChain::PerturbationChain(const Scene& scene, const DelayedRejection& delayed_rejection,
-                                     const Remainder& remainder, int max_depth)
+                                     const Remainder& remainder, int max_depth,
+                                     double manifold_probability)
     : scene_(scene),
       delayed_rejection_(delayed_rejection),
       remainder_(remainder),
-      mutation_(scene, limits(max_depth)) {}
+      mutation_(scene, limits(max_depth, manifold_probability)) {}
 
-bool PerturbationChain::start_at(const FoundPath& path) {
-  start_.path = vertex_path(path);
+bool PerturbationChain::start_at(const VertexPath& path) {
+  start_.path = path;
   if (!start_.path.evaluate(scene_)) return false;
   start_.share = remainder_.share(start_.path);
   return std::isfinite(start_.share.log_remainder);

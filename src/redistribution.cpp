@@ -85,7 +85,7 @@ class RedistributionSampler {
         chain_(common.scene, common.options.kernel, common.options.delayed_rejection,
                common.remainder, common.layers),
         perturbations_(common.scene, common.options.delayed_rejection, common.remainder,
-                       common.options.max_depth),
+                       common.options.max_depth, kChainManifolds),
         splitting_(common.splitting) {}
 
   void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& film_sink) {
@@ -154,7 +154,7 @@ class RedistributionSampler {
   template <class Deposit>
   bool spread_by_perturbations(const ChainSchedule& schedule, const FoundPath& path, Rng& rng,
                                const Deposit& deposit) {
-    if (!perturbations_.start_at(path)) return false;
+    if (!perturbations_.start_at(vertex_path(path))) return false;
     for (double i = 0; i < schedule.chains; ++i)
       perturbations_.run(static_cast<std::uint64_t>(schedule.mutations), rng, deposit);
     return true;
@@ -212,6 +212,8 @@ LangevinResult render_redistribution(const Scene& scene, const LangevinOptions& 
                                      const RenderOptions& render, double samples_per_pixel) {
   if (options.redistribution.perturbations.value_or(0.0) > 0.0)
     require_pinhole(scene, "option perturbations");
+  if (options.splitting.last_perturbations.value_or(0.0) > 0.0)
+    require_pinhole(scene, "option last_perturbations");
   RenderClock clock(render);
   Redistribution common(scene, options, render);
   const double pilot_seconds = clock.seconds();

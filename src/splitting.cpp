@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "mutation_loop.h"
+#include "perturbation_chain.h"
 
 namespace driftlight {
 namespace {
@@ -19,6 +20,10 @@ constexpr double kMostCopies = 64;
 /// families of thousands, with 16 by 90).
 constexpr int kSteps = 4;
 constexpr int kStepsInLobes = 16;
+
+/// Share of manifold perturbations among the last steps: the others mostly miss the light, which is
+/// hard to find again.
+constexpr double kManifolds = 0.9;
 
 /// So many copies, each with its weight times `factor`: ratio in the mean.
 struct Copies {
@@ -103,6 +108,8 @@ struct Splitter::Particles {
         kernel_of_levels(level_kernel(options)),
         steps(options.splitting.steps.value_or(scenes.soften_lobes() ? kStepsInLobes : kSteps)),
         last(scene, kernel_of_last, options.delayed_rejection, remainder, layers),
+        perturbed(options.splitting.last_perturbations.value_or(is_pinhole(scene.camera()))),
+        perturbations(scene, options.delayed_rejection, remainder, options.max_depth, kManifolds),
         figures(static_cast<std::size_t>(scenes.top()) + 1) {
     for (int k = 1; k <= scenes.top(); ++k)
       levels.push_back(
@@ -183,11 +190,15 @@ struct Splitter::Particles {
     ++figures_of(0).particles;
     const LobeSequence sequence(topology);
     const int visits = options.splitting.last_steps;
+    const auto report = [&](const Share& at, const Rgbd& color, double weight) {
+      (*visit)(sequence, number, at, color, weight * deposit / visits);
+    };
+    const auto steps_there = static_cast<std::uint64_t>(visits);
+    if (rng.uniform() < perturbed &&
+        perturbations.start_at(vertex_path(scene, topology, coordinates)))
+      return perturbations.run(steps_there, rng, report);
     last.start_at({topology, coordinates, c, share});
-    last.run(static_cast<std::uint64_t>(visits), rng,
-             [&](const Share& at, const Rgbd& color, double weight) {
-               (*visit)(sequence, number, at, color, weight * deposit / visits);
-             });
+    last.run(steps_there, rng, report);
   }
 
   const TemperedScenes& scenes;
@@ -200,6 +211,8 @@ struct Splitter::Particles {
   int steps;                                   ///< at each softer level
   std::vector<std::unique_ptr<Level>> levels;  ///< 1 and above
   RemainderChain last;
+  double perturbed;  ///< share of the particles whose last steps are perturbations
+  PerturbationChain perturbations;
   std::vector<LevelFigures> figures;
   std::vector<Start> starts;
   const Visit* visit = nullptr;
@@ -272,8 +285,8 @@ void Splitter::sample(const Vec2d& film, const SplittingPlan& plan, Rng& rng, co
 
 std::vector<LevelFigures> Splitter::take_figures() {
   if (!particles_) return {};
-  const ChainFigures last = particles_->last.take_statistics();
-  add_to(particles_->figures_of(0), last);
+  add_to(particles_->figures_of(0), particles_->last.take_statistics());
+  add_to(particles_->figures_of(0), particles_->perturbations.take_statistics());
   std::vector<LevelFigures> figures(particles_->figures.size());
   std::swap(figures, particles_->figures);
   return figures;

@@ -160,11 +160,16 @@ void require_pinhole(const Scene& scene, const std::string& who) {
                      (camera.has_lens() ? "has a lens" : "is orthographic"));
 }
 
-VertexPath vertex_path(const Scene& scene, const PathSampler::Sample& sample) {
+VertexPath vertex_path(const Scene& scene, const PathTopology& topology,
+                       const PathCoordinates& coordinates) {
   VertexPath path;
-  VertexVisitor visitor(scene, sample.topology, path);
-  walk<double>(scene, sample.topology, sample.coordinates, visitor);
+  VertexVisitor visitor(scene, topology, path);
+  walk<double>(scene, topology, coordinates, visitor);
   return path;
+}
+
+VertexPath vertex_path(const Scene& scene, const PathSampler::Sample& sample) {
+  return vertex_path(scene, sample.topology, sample.coordinates);
 }
 
 VertexPath vertex_path(const FoundPath& found) {

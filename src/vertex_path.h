@@ -118,6 +118,8 @@ bool is_pinhole(const Camera& camera);
 void require_pinhole(const Scene& scene, const std::string& who);
 
 /// The same paths by their vertices, not yet evaluated.
+VertexPath vertex_path(const Scene& scene, const PathTopology& topology,
+                       const PathCoordinates& coordinates);
 VertexPath vertex_path(const Scene& scene, const PathSampler::Sample& sample);
 VertexPath vertex_path(const FoundPath& found);
 

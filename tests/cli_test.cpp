@@ -414,7 +414,9 @@ TEST_F(Cli, ParticlesAreReportedAndDoubtedWhereTheyAreFew) {
   EXPECT_GT(splitting.at("lobe_sequences"), 0);
   EXPECT_GT(splitting.at("effective_families"), 1.0);
   EXPECT_GT(splitting.at("mean"), 0.0);
-  EXPECT_LE(splitting.at("mean_of_few_families"), splitting.at("mean"));
+  // Of all tiles, but for rounding.
+  EXPECT_LE(splitting.at("mean_of_few_families").get<double>(),
+            (1.0 + 1e-9) * splitting.at("mean").get<double>());
   ASSERT_GT(splitting.at("levels").size(), 1U);
   for (const auto& level : splitting.at("levels")) {
     EXPECT_GT(level.at("particles"), 0);

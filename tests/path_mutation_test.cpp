@@ -319,6 +319,7 @@ struct Kind {
   std::string name;
   Propose propose;
   bool keeps_lobes;
+  int draws = 150000;
 };
 
 const std::vector<Kind>& kinds() {
@@ -342,12 +343,13 @@ const std::vector<Kind>& kinds() {
        [](const auto& by, const auto& x, auto& y, auto& t, auto& rng) {
          return PathMutation::has_manifold(x) ? by.manifold(x, y, t, rng) : TraceStatus::OtherLobe;
        },
-       true}};
+       true, 400000}};
   return kKinds;
 }
 
 /// Classes of paths that a mutation may leave: its length and its delta lobes, also in pairs; and
-/// of perturbations, which keep these, the half of the film and the side of x_(n-1).
+/// of perturbations, which keep these, the half of the film, the side of x_(n-1), and how far apart
+/// and how inclined vertices are.
 std::vector<std::string> classes_of(const Kind& kind, const VertexPath& path, const Scene& scene) {
   if (!kind.keeps_lobes) {
     int deltas = 0;
@@ -360,15 +362,17 @@ std::vector<std::string> classes_of(const Kind& kind, const VertexPath& path, co
   const Vec3d last = path.edges > 1 ? path(path.edges - 1).surface.at.p : scene.center();
   const std::string lobes = sequence(path);
   const auto unit_of = [](double log) { return std::to_string(std::lround(2.0 * log)); };
-  const bool surface = path.edges > 1;
-  return {surface ? "arriving " + unit_of(path.log_arriving(1)) : "",
-          surface ? "leaving " + unit_of(path.log_leaving(1)) : "",
-          film.x() < 0.5 ? "left" : "right",
-          film.y() < 0.5 ? "top" : "bottom",
-          last.x() < scene.center().x() ? "low x" : "high x",
-          last.z() < scene.center().z() ? "low z" : "high z",
-          lobes + (film.x() < 0.5 ? " left" : " right"),
-          lobes + (last.x() < scene.center().x() ? " low x" : " high x")};
+  std::vector<std::string> classes{film.x() < 0.5 ? "left" : "right",
+                                   film.y() < 0.5 ? "top" : "bottom",
+                                   last.x() < scene.center().x() ? "low x" : "high x",
+                                   last.z() < scene.center().z() ? "low z" : "high z",
+                                   lobes + (film.x() < 0.5 ? " left" : " right"),
+                                   lobes + (last.x() < scene.center().x() ? " low x" : " high x")};
+  for (int k = 1; k < path.edges; ++k) {
+    classes.push_back("arriving " + std::to_string(k) + " " + unit_of(path.log_arriving(k)));
+    classes.push_back("leaving " + std::to_string(k) + " " + unit_of(path.log_leaving(k)));
+  }
+  return classes;
 }
 
 /// Draws paths of all lengths by all ways in turn, and their weights w = f / q.
@@ -423,7 +427,7 @@ double balance_p_value(const TestScene& test, const Kind& kind, bool exchanged, 
   const double bound = 20.0 * paths.mean_weight();
   VertexPath x;
   VertexPath y;
-  for (std::uint64_t i = 0; i < 150000; ++i) {
+  for (std::uint64_t i = 0; i < static_cast<std::uint64_t>(kind.draws); ++i) {
     Rng rng(310, Stream::Test, i);
     if (!paths.draw(i, x, rng)) continue;
     const double w = paths.weight(x);

@@ -113,7 +113,11 @@ struct SplittingOptions {
   /// dies as a whole from level to level; to move across lobes matters more than far over the film.
   double trust = 0.05;
   /// Steps at the last one, whose visits make the image.
-  int last_steps = 16;
+  int last_steps = 32;
+  /// Share of the particles that take these as perturbations (Veach and Guibas 1997), manifold
+  /// perturbations (Jakob and Marschner 2012) above all, and not as Langevin steps; more than 0
+  /// with a pinhole only. None: all with a pinhole, else none.
+  std::optional<double> last_perturbations = std::nullopt;
   /// Samples of each round of the pilot.
   int pilot = 16384;
 };
@@ -278,7 +282,7 @@ struct MalaOptions : GaussianStepOptions {
 struct PerturbationOptions {
   /// Share of the perturbations that are manifold perturbations (Jakob and Marschner 2012), where
   /// the path has one.
-  double manifold_probability = 0.5;
+  double manifold_probability = 0.25;
   /// Sizes between which they are drawn log-uniformly, in widths of the film; directions move by
   /// the angle that so much of the field of view is.
   double step_min = 1.0 / 2048.0;

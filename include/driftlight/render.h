@@ -191,8 +191,9 @@ LangevinResult render_mala(const Scene& scene, const MalaOptions& options,
                            const RenderOptions& render, double mutations_per_pixel);
 
 /// Renders with Metropolis light transport (Veach and Guibas 1997, "Metropolis light transport";
-/// Veach 1997, ch. 11): chains of paths by their vertices, with bidirectional mutations and lens,
-/// caustic and multi-chain perturbations. Statistics as of Mode::Chain, the bidirectional mutations
+/// Veach 1997, ch. 11): chains of paths by their vertices, with bidirectional mutations, lens,
+/// caustic and multi-chain perturbations, and manifold perturbations (Jakob and Marschner 2012,
+/// "Manifold exploration"). Statistics as of Mode::Chain, the bidirectional mutations
 /// as large steps and the perturbations as small ones. Throws as render_langevin.
 LangevinResult render_mlt(const Scene& scene, const MltOptions& options,
                           const RenderOptions& render, double mutations_per_pixel);

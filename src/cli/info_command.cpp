@@ -195,7 +195,8 @@ void run(const IntegratorsCommand& /*command*/) {
       describe_integrator<MltOptions>(
           "mlt",
           "Metropolis light transport by bidirectional mutations and lens, caustic and multi-chain "
-          "perturbations of paths (Veach and Guibas 1997, doi 10.1145/258734.258775)") +
+          "perturbations of paths (Veach and Guibas 1997, doi 10.1145/258734.258775), and by "
+          "manifold perturbations (Jakob and Marschner 2012, doi 10.1145/2185520.2185554)") +
       describe_integrator<ErptOptions>(
           "erpt",
           "energy redistribution path tracing: bidirectional samples whose light short chains of "
