@@ -189,16 +189,15 @@ struct Splitter::Particles {
               const Contribution& c, const Share& share, double deposit, Rng& rng) {
     ++figures_of(0).particles;
     const LobeSequence sequence(topology);
-    const int visits = options.splitting.last_steps;
+    const auto visits = static_cast<std::uint64_t>(options.splitting.last_steps);
     const auto report = [&](const Share& at, const Rgbd& color, double weight) {
-      (*visit)(sequence, number, at, color, weight * deposit / visits);
+      (*visit)(sequence, number, at, color, weight * deposit / options.splitting.last_steps);
     };
-    const auto steps_there = static_cast<std::uint64_t>(visits);
     if (rng.uniform() < perturbed &&
         perturbations.start_at(vertex_path(scene, topology, coordinates)))
-      return perturbations.run(steps_there, rng, report);
+      return perturbations.run(visits, rng, report);
     last.start_at({topology, coordinates, c, share});
-    last.run(steps_there, rng, report);
+    last.run(visits, rng, report);
   }
 
   const TemperedScenes& scenes;

@@ -111,17 +111,19 @@ const std::map<std::string, Way>& ways() {
       {"two_levels",
        {.mode = Mode::Splitting,
         .drift = Drift::None,
-        .splitting = {.all = true, .levels = 2, .steps = 1, .last_steps = 4}}},
+        .splitting =
+            {.all = true, .levels = 2, .steps = 1, .last_steps = 4, .last_perturbations = 0.5}}},
       {"eight_levels",
        {.mode = Mode::Splitting,
         .drift = Drift::Full,
         .redistribution = {.mutations_per_sample = 100},
-        .splitting = {.all = true, .levels = 8, .steps = 16, .last_steps = 1}}},
+        .splitting =
+            {.all = true, .levels = 8, .steps = 16, .last_steps = 1, .last_perturbations = 0}}},
       {"high_threshold",
        {.mode = Mode::Splitting,
         .phase_space = PhaseSpace::Bidirectional,
         .redistribution = {.threshold = 20},
-        .splitting = {.all = true, .levels = 4, .steps = std::nullopt}}}};
+        .splitting = {.all = true, .levels = 4, .steps = std::nullopt, .last_perturbations = 0}}}};
   return kWays;
 }
 
@@ -343,6 +345,7 @@ TEST_P(MutationsEqualPath, TileMeans) {
 
 INSTANTIATE_TEST_SUITE_P(Some, MutationsEqualPath,
                          testing::Values(Case{"limelight", "mlt"}, Case{"limelight", "erpt"},
+                                         Case{"glass_caustic", "erpt"},
                                          Case{"limelight", "mlt_delayed"},
                                          Case{"limelight", "erpt_delayed"}),
                          name_of);
