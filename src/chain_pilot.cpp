@@ -128,7 +128,7 @@ class Sampler {
         splitting_(splitting),
         tracer_(scene, pilot.guide, MisHeuristic::Power, options.max_depth),
         langevin_(scene, options.kernel, options.delayed_rejection, remainder, nullptr),
-        perturbed_(scene, options.delayed_rejection, remainder, options.max_depth, kChainManifolds),
+        perturbed_(scene, options.delayed_rejection, remainder, options.max_depth),
         light_(light) {}
 
   Sample run(const Vec2d& film, Rng& rng) {

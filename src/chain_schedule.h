@@ -12,9 +12,6 @@ namespace driftlight {
 /// What a Langevin step costs in bidirectional samples, and what a perturbation does.
 inline constexpr double kMutationCost = 0.3;
 inline constexpr double kPerturbationCost = 0.15;
-/// Share of manifold perturbations in perturbed chains: where these are chosen light comes through
-/// an opening, and their time is better spent on the others.
-inline constexpr double kChainManifolds = 0.0;
 
 /// Deposit of a mutation where samples leave so much light in the mean, in units of the brightness
 /// about, for at most so many mutations a sample. Where they leave little more mutations no longer

@@ -13,15 +13,14 @@ namespace driftlight {
 /// Runs short chains that leave the remainder invariant, as RemainderChain does, by the
 /// perturbations of path_mutation.h. Those of Veach and Guibas 1997 move a path at one end and keep
 /// its vertices at the other, so that what is narrow there, such as an opening that the light comes
-/// through, does not hold them up; manifold perturbations keep where it comes from through glass.
-/// They keep the lobes, by which a
-/// path has a chart or none, so they stay among the paths that chains start from. The sensor is a
-/// pinhole.
+/// through, does not hold them up; manifold perturbations also keep what lies behind glass. All
+/// keep the lobes, by which a path has a chart or none, so they stay among the paths that chains
+/// start from. The sensor is a pinhole.
 class PerturbationChain {
  public:
   /// Of paths of at most so many edges; `manifold_probability` as MutationLimits has it.
   PerturbationChain(const Scene& scene, const DelayedRejection& delayed_rejection,
-                    const Remainder& remainder, int max_depth, double manifold_probability);
+                    const Remainder& remainder, int max_depth, double manifold_probability = 0);
 
   /// The path that the next chains start from, not yet evaluated. False if by rounding nothing of
   /// it remains.

@@ -85,7 +85,7 @@ class RedistributionSampler {
         chain_(common.scene, common.options.kernel, common.options.delayed_rejection,
                common.remainder, common.layers),
         perturbations_(common.scene, common.options.delayed_rejection, common.remainder,
-                       common.options.max_depth, kChainManifolds),
+                       common.options.max_depth),
         splitting_(common.splitting) {}
 
   void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& film_sink) {
