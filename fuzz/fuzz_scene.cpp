@@ -6,10 +6,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
-    // Strict: else a misspelt resolution of a sky is only named, and a large map takes seconds
-    // here.
-    driftlight::load_scene(driftlight::fuzz::input_file("scene.xml", data, size),
-                           {.defines = {}, .strict = true});
+    driftlight::load_scene(driftlight::fuzz::input_file("scene.xml", data, size));
   } catch (const driftlight::InputError&) {
     // A message for the user: what bad files are meant to end in.
   }

@@ -164,7 +164,11 @@ int read_daylight_resolution(Properties& properties, bool has_sun) {
   const bool fine = has_sun && properties.dialect() == Dialect::Mitsuba3;
   const int width = properties.integer("resolution", fine ? 2048 : 512);
   if (width < 8 || width > 16384) properties.fail("resolution", "must be between 8 and 16384");
+#ifdef FUZZING_BUILD_MODE_UNSAFE_FOR_PRODUCTION
+  return std::min(width, 64);  // The widest maps take minutes under the sanitizers.
+#else
   return width;
+#endif
 }
 
 /// Both are scaled to nothing where the plugin lacks them.
