@@ -7,12 +7,13 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "bidirectional_tracer.h"
 #include "chain_schedule.h"
-#include "perturbation_chain.h"
+#include "mixed_chain.h"
 
 namespace driftlight {
 namespace {
@@ -23,14 +24,16 @@ constexpr std::uint64_t kTask = 64;
 constexpr std::uint64_t kFewer = 4;
 /// Starts of chains that are followed, in the mean, over samples.
 constexpr double kStarts = 1.0 / 16.0;
+/// Share of perturbations in mixed chains.
+constexpr double kMixed = 0.25;
 
 /// A pilot errs, by tails above all that it does not see: another plan than the one that serves
-/// almost everywhere, Langevin steps for what is brighter than most, must promise so much more. On
+/// almost everywhere, mixed chains for what is brighter than most, must promise so much more. On
 /// `torus` pilots promised 1.5 times of high thresholds, which have 1.5 times the error, and up to
 /// 3.7 times of perturbed chains, which have four times the error; where all light comes through an
 /// opening 7 to 13 times of perturbed chains.
 double doubt(const ChainPlan& plan) {
-  if (plan.perturbations > 0.0) return 5.0;
+  if (plan.perturbations == 1.0) return 5.0;
   return plan.threshold == 1.0 && plan.mutations_per_sample == 4.0 ? 1.0 : 2.0;
 }
 
@@ -46,10 +49,9 @@ struct Spread {
 struct Bright {
   double factor;
   double w;
-  bool is_seen;        ///< the path of one edge
-  bool starts_chains;  ///< else splitting takes what samples leave
-  Spread langevin{};   ///< by Langevin steps
-  Spread perturbed{};
+  bool is_seen;                    ///< the path of one edge
+  bool starts_chains;              ///< else splitting takes what samples leave
+  std::array<Spread, 2> spread{};  ///< by the kind of its chains
 
   double kept(double tau) const { return factor * std::min(w, own(tau)); }
   double left(double tau) const {
@@ -82,18 +84,20 @@ struct Sample {
 
 /// The plans among which the best is chosen.
 struct Choices {
-  std::vector<double> thresholds;  ///< rising
-  std::vector<double> perturbations;
+  std::vector<double> thresholds;     ///< rising
+  std::vector<double> perturbations;  ///< by kind
   std::vector<double> mutations_per_sample;
 
   Choices(const Scene& scene, const RedistributionOptions& options, bool splits)
-      : thresholds{1, 2, 4, 8, 16, 64, 256, 1024}, perturbations{0}, mutations_per_sample{4} {
+      : thresholds{1, 2, 4, 8, 16, 64, 256, 1024},
+        perturbations{is_pinhole(scene.camera()) ? kMixed : 0.0},
+        mutations_per_sample{4} {
     if (!splits) {
       thresholds.insert(thresholds.begin(), {1.0 / 64.0, 1.0 / 16.0, 1.0 / 4.0});
       mutations_per_sample.insert(mutations_per_sample.end(), {16.0, 64.0});
       if (is_pinhole(scene.camera())) perturbations.push_back(1);
-      if (options.perturbations) perturbations = {*options.perturbations};
     }
+    if (options.perturbations) perturbations = {*options.perturbations};
     if (options.threshold) thresholds = {*options.threshold};
     if (options.mutations_per_sample) mutations_per_sample = {*options.mutations_per_sample};
   }
@@ -110,8 +114,9 @@ struct Choices {
     return plans;
   }
   double least_threshold() const { return thresholds.front(); }
-  bool steps() const { return perturbations.front() < 1.0; }
-  bool perturbs() const { return perturbations.back() > 0.0; }
+  std::size_t kind(const ChainPlan& plan) const {
+    return plan.perturbations == perturbations.front() ? 0 : 1;
+  }
 };
 
 /// Runs samples, and follows single chains.
@@ -127,9 +132,11 @@ class Sampler {
         remainder_(remainder),
         splitting_(splitting),
         tracer_(scene, pilot.guide, MisHeuristic::Power, options.max_depth),
-        langevin_(scene, options.kernel, options.delayed_rejection, remainder, nullptr),
-        perturbed_(scene, options.delayed_rejection, remainder, options.max_depth),
-        light_(light) {}
+        light_(light) {
+    for (const double share : choices.perturbations)
+      chains_.push_back(std::make_unique<MixedChain>(scene, options, options.kernel, share,
+                                                     kManifoldsOfChains, remainder, nullptr));
+  }
 
   Sample run(const Vec2d& film, Rng& rng) {
     sample_ = {};
@@ -166,24 +173,17 @@ class Sampler {
     return bright;
   }
 
-  /// By Langevin steps or by perturbations, if either is a choice.
+  /// By chains of one kind.
   void follow(const Vec2d& film, const FoundPath& path, double chosen, Bright& bright) {
-    const bool both = choices_.steps() && choices_.perturbs();
-    const double probability = both ? 0.5 * chosen : chosen;
+    const std::size_t kind = chains_.size() > 1 && rng_->uniform() < 0.5 ? chains_.size() - 1 : 0;
+    const double probability = chosen / static_cast<double>(chains_.size());
+    MixedChain& chain = *chains_[kind];
     const Spread stays{1.0 / probability, 1.0 / probability, 1.0 / probability};
-    if (both ? rng_->uniform() < 0.5 : choices_.perturbs()) {
-      bright.perturbed =
-          perturbed_.start_at(vertex_path(path)) ? spread(film, probability, perturbed_) : stays;
-      return;
-    }
-    const auto start = remainder_.bright_path(path, options_.phase_space);
-    if (start) langevin_.start_at(*start);
-    bright.langevin = start ? spread(film, probability, langevin_) : stays;
+    bright.spread.at(kind) = chain.start_at(path) ? spread(film, probability, chain) : stays;
   }
 
   /// Of two chains from the start, which is at this film point.
-  template <class Chain>
-  Spread spread(const Vec2d& film, double probability, Chain& chain) {
+  Spread spread(const Vec2d& film, double probability, MixedChain& chain) {
     std::map<std::size_t, std::array<double, 2>> pixels;
     const int length = options_.redistribution.chain_length;
     for (const std::size_t i : {0U, 1U})
@@ -207,28 +207,16 @@ class Sampler {
   const Remainder& remainder_;
   const SplittingShare& splitting_;
   BidirectionalTracer tracer_;
-  RemainderChain langevin_;
-  PerturbationChain perturbed_;
+  std::vector<std::unique_ptr<MixedChain>> chains_;  ///< by kind
   double light_;
   Sample sample_;
   Vec2d film_ = Vec2d::Zero();
   Rng* rng_ = nullptr;
 };
 
-/// Of the chains of a start by the plan.
-Spread spread_by(const ChainPlan& plan, const Bright& bright) {
-  const double p = plan.perturbations;
-  const auto mix = [p](double langevin, double perturbed) {
-    return (1.0 - p) * langevin + p * perturbed;
-  };
-  return {mix(bright.langevin.kappa, bright.perturbed.kappa),
-          mix(bright.langevin.overlap, bright.perturbed.overlap),
-          mix(bright.langevin.home, bright.perturbed.home)};
-}
-
 /// Error times time by the pilot, up to a factor. Each two samples are of one pixel.
-double cost_of(const std::vector<Sample>& samples, const ChainPlan& plan, double sample_cost,
-               double chain_length) {
+double cost_of(const std::vector<Sample>& samples, const ChainPlan& plan, std::size_t kind,
+               double sample_cost, double chain_length) {
   const auto count = static_cast<double>(samples.size());
   const double tau = plan.threshold;
   double left = 0.0;
@@ -246,7 +234,7 @@ double cost_of(const std::vector<Sample>& samples, const ChainPlan& plan, double
   Spread mean{};
   const auto add_chains = [&](const Bright& bright, double others, double kept, double weight) {
     const double r = bright.left(tau);
-    const Spread spread = spread_by(plan, bright);
+    const Spread& spread = bright.spread.at(kind);
     noise += weight * r * (light * spread.kappa + std::max(0.0, r - light) * spread.overlap);
     met += weight * r * others;
     met_kept += weight * 2.0 * r * kept;
@@ -316,7 +304,8 @@ ChainPlan plan_chains(const Scene& scene, const LangevinOptions& options, const 
       run(first_count, count, left / static_cast<double>(first_count) / kStarts);
   std::vector<double> costs(plans.size());
   tbb::parallel_for(std::size_t{0}, plans.size(), [&](std::size_t i) {
-    costs[i] = cost_of(samples, plans[i], pilot.sample_cost, options.redistribution.chain_length) *
+    costs[i] = cost_of(samples, plans[i], choices.kind(plans[i]), pilot.sample_cost,
+                       options.redistribution.chain_length) *
                doubt(plans[i]);
   });
   return plans[static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) -

@@ -6,10 +6,13 @@
 
 namespace driftlight {
 
+/// Share of manifold perturbations among those of chains.
+inline constexpr double kManifoldsOfChains = 0.5;
+
 /// How chains spread what samples leave. The image is right for any.
 struct ChainPlan {
   double threshold;             ///< tau
-  double perturbations;         ///< share of the starts whose chains are perturbed
+  double perturbations;         ///< share of the chains' turns that are of perturbations
   double mutations_per_sample;  ///< most, in the mean
 };
 
@@ -32,9 +35,8 @@ struct ChainPlan {
 /// where light comes through an opening, a low one is, and perturbations.
 ///
 /// Takes a fourth of the samples of `options.redistribution.pilot`, and a sixteenth. What
-/// `splitting` takes does not start chains. Where it takes anything chains are not perturbed, since
-/// a perturbation may change the lobe sequences by which it does, and tau is at least 1, for which
-/// it was planned.
+/// `splitting` takes does not start chains. Where it takes anything tau is at least 1, for which it
+/// was planned, and chains are mixed.
 ChainPlan plan_chains(const Scene& scene, const LangevinOptions& options, const Pilot& pilot,
                       const SplittingShare& splitting, std::uint64_t seed);
 

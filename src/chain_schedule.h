@@ -29,16 +29,14 @@ struct ChainSchedule {
   double deposit;
 };
 
-/// Chains of `length` mutations that deposit `deposit` each; if they would be too many, then longer
-/// ones, and if these are too long, mutations that deposit more.
+/// Chains of `length` mutations that deposit `deposit` each, or if they would be too many, more. As
+/// many mutations whatever the light: chains of a start x reach y after k mutations by P^k(x, y),
+/// and only what all starts bring there together is in balance, for each k.
 inline ChainSchedule schedule_chains(double light, double deposit, double length, Rng& rng) {
-  constexpr double kMostChains = 16;
-  constexpr double kMostStretch = 16;
+  constexpr double kMostChains = 256;
   const double chains = std::floor(light / (deposit * length) + rng.uniform());
   if (!(chains > kMostChains)) return {chains, length, deposit};
-  const double mutations =
-      std::ceil(std::min(light / (deposit * kMostChains), kMostStretch * length));
-  return {kMostChains, mutations, light / (mutations * kMostChains)};
+  return {kMostChains, length, light / (kMostChains * length)};
 }
 
 }  // namespace driftlight

@@ -173,8 +173,8 @@ std::vector<OptionEntry> redistribution_entries(RedistributionOptions& options) 
       number_or_auto("mutations_per_sample", options.mutations_per_sample, positive,
                      "most mutations for each sample, in the mean; auto: from a pilot"),
       number_or_auto("perturbations", options.perturbations, Range<double>{0, 1},
-                     "share of the starts whose chains move by the perturbations of mlt; auto: "
-                     "from a pilot"),
+                     "share of the mutations of chains that are perturbations of mlt; auto: from a "
+                     "pilot"),
       choice("guide", options.guide, std::array<std::string_view, 2>{"off", "on"},
              "light subpaths start where a pilot has found that light comes from"),
       number_or_auto("light_subpaths", options.light_subpaths, Range<double>{0, 1, true},
@@ -200,8 +200,8 @@ std::vector<OptionEntry> splitting_entries(SplittingOptions& options) {
       number("last_steps", options.last_steps, Range<int>{1, 1000000},
              "steps of a particle in the scene itself"),
       number_or_auto("last_perturbations", options.last_perturbations, Range<double>{0, 1},
-                     "share of the particles whose steps there are perturbations of mlt; auto: 1 "
-                     "with a pinhole, else 0"),
+                     "share of those steps that are perturbations of mlt; auto: 1 with a pinhole, "
+                     "else 0"),
       number("splitting_pilot", options.pilot, Range<int>{64, 1000000000},
              "samples of each round of the pilot that finds what particles are worth"),
   };

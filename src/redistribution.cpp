@@ -13,8 +13,8 @@
 #include "driftlight/error.h"
 #include "driftlight/film.h"
 #include "exact_sum.h"
+#include "mixed_chain.h"
 #include "pass_loop.h"
-#include "perturbation_chain.h"
 #include "pilot.h"
 #include "probed_starts.h"
 #include "remainder.h"
@@ -82,10 +82,8 @@ class RedistributionSampler {
   explicit RedistributionSampler(Redistribution& common)
       : common_(common),
         tracer_(common.scene, common.pilot.guide, MisHeuristic::Power, common.options.max_depth),
-        chain_(common.scene, common.options.kernel, common.options.delayed_rejection,
-               common.remainder, common.layers),
-        perturbations_(common.scene, common.options.delayed_rejection, common.remainder,
-                       common.options.max_depth),
+        chain_(common.scene, common.options, common.options.kernel, common.plan.perturbations,
+               kManifoldsOfChains, common.remainder, common.layers),
         splitting_(common.splitting) {}
 
   void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& film_sink) {
@@ -94,10 +92,7 @@ class RedistributionSampler {
     Sink sink{*this, film, rng, film_sink};
     tracer_.sample(film, rng, sink);
     if (left_ > 0.0) common_.remainders.add(left_);
-    if (starts_ > 0) {
-      common_.counts.add(chain_.take_statistics(), starts_);
-      common_.counts.add(perturbations_.take_statistics(), 0);
-    }
+    if (starts_ > 0) common_.counts.add(chain_.take_statistics(), starts_);
     splitting_.sample(film, rng);
   }
 
@@ -139,49 +134,28 @@ class RedistributionSampler {
       common_.film.splat(share.film, color,
                          weight * schedule.deposit * share.brightness / common_.unit);
     };
-    const bool perturbed = rng.uniform() < common_.plan.perturbations;
-    if (perturbed ? spread_by_perturbations(schedule, path, rng, deposit)
-                  : spread_by_steps(schedule, path, rng, deposit))
+    if (!chain_.start_at(path)) {
+      // No state of a chain: as if it never moved.
+      Share stays;
+      stays.film = film;
+      stays.brightness = common_.pilot.brightness(film);
+      deposit(stays, value / luminance(value), schedule.chains * schedule.mutations);
       return;
-    // No state of a chain: as if it never moved.
-    Share stays;
-    stays.film = film;
-    stays.brightness = common_.pilot.brightness(film);
-    deposit(stays, value / luminance(value), schedule.chains * schedule.mutations);
-  }
-
-  /// False if the path is no state of such a chain.
-  template <class Deposit>
-  bool spread_by_perturbations(const ChainSchedule& schedule, const FoundPath& path, Rng& rng,
-                               const Deposit& deposit) {
-    if (!perturbations_.start_at(vertex_path(path))) return false;
-    for (double i = 0; i < schedule.chains; ++i)
-      perturbations_.run(static_cast<std::uint64_t>(schedule.mutations), rng, deposit);
-    return true;
-  }
-
-  /// The same by Langevin steps.
-  template <class Deposit>
-  bool spread_by_steps(const ChainSchedule& schedule, const FoundPath& path, Rng& rng,
-                       const Deposit& deposit) {
-    const auto start = common_.remainder.bright_path(path, common_.options.phase_space);
-    if (!start) return false;
+    }
     std::optional<GradientProbe> probe =
-        common_.probed
-            ? common_.probed->probe(start->contribution, schedule.chains * schedule.mutations)
+        common_.probed && chain_.start()
+            ? common_.probed->probe(chain_.start()->contribution,
+                                    schedule.chains * schedule.mutations)
             : std::nullopt;
     chain_.observe(probe ? &*probe : nullptr);
-    chain_.start_at(*start);
     for (double i = 0; i < schedule.chains; ++i)
       chain_.run(static_cast<std::uint64_t>(schedule.mutations), rng, deposit);
     if (probe) common_.probed->take(*probe);
-    return true;
   }
 
   Redistribution& common_;
   BidirectionalTracer tracer_;
-  RemainderChain chain_;
-  PerturbationChain perturbations_;
+  MixedChain chain_;
   SplittingShare::Sampler splitting_;
   // Of the sample in hand.
   double left_ = 0;  ///< to chains

@@ -20,10 +20,19 @@ double Remainder::left(double weight, const FoundPath& path) const {
 
 std::optional<BrightPath> Remainder::bright_path(const FoundPath& path,
                                                  PhaseSpace phase_space) const {
-  const auto sample = state_of(scene_, path, phase_space);
-  if (!sample) return std::nullopt;
-  BrightPath bright{sample->topology, sample->coordinates,
-                    contribution(scene_, sample->topology, sample->coordinates), Share{}};
+  return bright_path(state_of(scene_, path, phase_space));
+}
+
+std::optional<BrightPath> Remainder::bright_path(const VertexPath& path,
+                                                 PhaseSpace phase_space) const {
+  return bright_path(state_of(scene_, path, phase_space));
+}
+
+std::optional<BrightPath> Remainder::bright_path(
+    const std::optional<PathSampler::Sample>& path) const {
+  if (!path) return std::nullopt;
+  BrightPath bright{path->topology, path->coordinates,
+                    contribution(scene_, path->topology, path->coordinates), Share{}};
   bright.share = share(bright.topology, bright.coordinates, bright.contribution);
   if (!std::isfinite(bright.share.log_remainder)) return std::nullopt;
   return bright;
@@ -57,11 +66,11 @@ Share Remainder::share(int edges, const Contribution& contribution, double log_q
 }
 
 void RemainderChain::start_at(const BrightPath& path) {
-  start_.state.topology = path.topology;
-  start_.state.coordinates = path.coordinates;
-  start_.state.contribution = path.contribution;
-  start_.state.has_step = false;
-  start_.share = path.share;
+  current_.state.topology = path.topology;
+  current_.state.coordinates = path.coordinates;
+  current_.state.contribution = path.contribution;
+  current_.state.has_step = false;
+  current_.share = path.share;
 }
 
 double RemainderChain::propose(Visit& from, Visit& to, MutationStage stage, Rng& rng,

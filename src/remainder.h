@@ -76,6 +76,7 @@ class Remainder {
   /// The path with coordinates of the phase space; none if it has none there, or if by rounding
   /// nothing of it remains.
   std::optional<BrightPath> bright_path(const FoundPath& path, PhaseSpace phase_space) const;
+  std::optional<BrightPath> bright_path(const VertexPath& path, PhaseSpace phase_space) const;
   /// Of a path with light. One that is too bright, or whose density is not finite, has no
   /// remainder.
   Share share(const PathTopology& topology, const PathCoordinates& coordinates,
@@ -85,6 +86,7 @@ class Remainder {
 
  private:
   Share share(int edges, const Contribution& contribution, double log_q) const;
+  std::optional<BrightPath> bright_path(const std::optional<PathSampler::Sample>& path) const;
 
   const Scene& scene_;
   const EmissionGuide& guide_;
@@ -92,7 +94,7 @@ class Remainder {
   double tau_;
 };
 
-/// Runs short chains that leave the remainder invariant.
+/// A chain that leaves the remainder invariant, by Langevin steps.
 class RemainderChain {
  public:
   /// Steps are recorded in `layers` unless it is null. The kernel must outlive it.
@@ -103,16 +105,24 @@ class RemainderChain {
         small_step_(scene, kernel, delayed_rejection.scale()),
         layers_(layers) {}
 
-  /// The path that the next chains start from.
   void start_at(const BrightPath& path);
+  BrightPath current() const {
+    return {current_.state.topology, current_.state.coordinates, current_.state.contribution,
+            current_.share};
+  }
 
   /// Shows the probe, unless it is null, each state whose step is prepared from now on.
   void observe(GradientProbe* probe) { small_step_.observe(probe); }
 
   /// Reports visits to splat(share, color, weight): after each mutation both states, with weights
-  /// that add up to 1.
+  /// that add up to 1. Returns whether it has moved.
   template <class Splat>
-  void run(std::uint64_t mutations, Rng& rng, const Splat& splat);
+  bool run(std::uint64_t mutations, Rng& rng, const Splat& splat);
+  /// Reports what as many mutations would that all fail.
+  template <class Splat>
+  void stay(std::uint64_t mutations, const Splat& splat) const {
+    splat(current_.share, current_.state.contribution.color, static_cast<double>(mutations));
+  }
 
   /// Since they were last taken.
   ChainFigures take_statistics() { return std::exchange(figures_, {}); }
@@ -129,13 +139,13 @@ class RemainderChain {
   const Remainder& remainder_;
   SmallStep small_step_;
   StepLayers* layers_;
-  Visit start_;
+  Visit current_;
   std::array<Visit, 3> visits_;
   ChainFigures figures_;
 };
 
 template <class Splat>
-void RemainderChain::run(std::uint64_t mutations, Rng& rng, const Splat& splat) {
+bool RemainderChain::run(std::uint64_t mutations, Rng& rng, const Splat& splat) {
   const auto propose = [&](Visit& from, Visit& to, MutationStage stage, Rng& numbers,
                            Rejections& rejections) {
     const double ratio = this->propose(from, to, stage, numbers, rejections);
@@ -143,10 +153,13 @@ void RemainderChain::run(std::uint64_t mutations, Rng& rng, const Splat& splat) 
       small_step_.record(from.state, std::min(1.0, ratio), *layers_);
     return ratio;
   };
-  run_mutations(start_, visits_, {mutations, small_step_.delays_rejection()}, rng, figures_,
-                propose, [&](const Visit& at, double weight) {
-                  splat(at.share, at.state.contribution.color, weight);
-                });
+  Visit& last = run_mutations(current_, visits_, {mutations, small_step_.delays_rejection()}, rng,
+                              figures_, propose, [&](const Visit& at, double weight) {
+                                splat(at.share, at.state.contribution.color, weight);
+                              });
+  if (&last == &current_) return false;
+  std::swap(current_, last);
+  return true;
 }
 
 }  // namespace driftlight

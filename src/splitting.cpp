@@ -7,8 +7,8 @@
 #include <optional>
 #include <utility>
 
+#include "mixed_chain.h"
 #include "mutation_loop.h"
-#include "perturbation_chain.h"
 
 namespace driftlight {
 namespace {
@@ -21,8 +21,8 @@ constexpr double kMostCopies = 64;
 constexpr int kSteps = 4;
 constexpr int kStepsInLobes = 16;
 
-/// Share of manifold perturbations among the last steps: the others mostly miss the light, which is
-/// hard to find again.
+/// Share of manifold perturbations among those of the last steps: the others mostly miss the light,
+/// which is hard to find again.
 constexpr double kManifolds = 0.9;
 
 /// So many copies, each with its weight times `factor`: ratio in the mean.
@@ -107,9 +107,9 @@ struct Splitter::Particles {
         kernel_of_last(last_kernel(options)),
         kernel_of_levels(level_kernel(options)),
         steps(options.splitting.steps.value_or(scenes.soften_lobes() ? kStepsInLobes : kSteps)),
-        last(scene, kernel_of_last, options.delayed_rejection, remainder, layers),
-        perturbed(options.splitting.last_perturbations.value_or(is_pinhole(scene.camera()))),
-        perturbations(scene, options.delayed_rejection, remainder, options.max_depth, kManifolds),
+        last(scene, options, kernel_of_last,
+             options.splitting.last_perturbations.value_or(is_pinhole(scene.camera())), kManifolds,
+             remainder, layers),
         figures(static_cast<std::size_t>(scenes.top()) + 1) {
     for (int k = 1; k <= scenes.top(); ++k)
       levels.push_back(
@@ -193,9 +193,6 @@ struct Splitter::Particles {
     const auto report = [&](const Share& at, const Rgbd& color, double weight) {
       (*visit)(sequence, number, at, color, weight * deposit / options.splitting.last_steps);
     };
-    if (rng.uniform() < perturbed &&
-        perturbations.start_at(vertex_path(scene, topology, coordinates)))
-      return perturbations.run(visits, rng, report);
     last.start_at({topology, coordinates, c, share});
     last.run(visits, rng, report);
   }
@@ -209,9 +206,7 @@ struct Splitter::Particles {
   KernelOptions kernel_of_levels;
   int steps;                                   ///< at each softer level
   std::vector<std::unique_ptr<Level>> levels;  ///< 1 and above
-  RemainderChain last;
-  double perturbed;  ///< share of the particles whose last steps are perturbations
-  PerturbationChain perturbations;
+  MixedChain last;
   std::vector<LevelFigures> figures;
   std::vector<Start> starts;
   const Visit* visit = nullptr;
@@ -285,7 +280,6 @@ void Splitter::sample(const Vec2d& film, const SplittingPlan& plan, Rng& rng, co
 std::vector<LevelFigures> Splitter::take_figures() {
   if (!particles_) return {};
   add_to(particles_->figures_of(0), particles_->last.take_statistics());
-  add_to(particles_->figures_of(0), particles_->perturbations.take_statistics());
   std::vector<LevelFigures> figures(particles_->figures.size());
   std::swap(figures, particles_->figures);
   return figures;

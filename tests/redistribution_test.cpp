@@ -8,10 +8,12 @@
 #include <vector>
 
 #include "brightness_map.h"
+#include "chain_schedule.h"
 #include "driftlight/error.h"
 #include "driftlight/render.h"
 #include "found_path.h"
 #include "light_rate.h"
+#include "lobe_sequence.h"
 #include "remainder.h"
 #include "support/learned_guide.h"
 #include "support/test_scenes.h"
@@ -32,6 +34,7 @@ struct ComparingSink {
   int different = 0;
   int by_vertices = 0;
   int different_by_vertices = 0;
+  int other_state = 0;  ///< of those by vertices
 
   void add(const Rgbd& value, const FoundPath& path) { splat(film, value, path); }
   void splat(const Vec2d& at, const Rgbd& value, const FoundPath& path) {
@@ -58,6 +61,20 @@ struct ComparingSink {
     const Share share = remainder.share(vertices);
     EXPECT_NEAR((share.film - at).norm(), 0.0, 1e-6);
     if (std::abs(share.w * share.brightness / y - 1.0) > 1e-5) ++different_by_vertices;
+    for (const PhaseSpace space : {PhaseSpace::Directions, PhaseSpace::Bidirectional})
+      if (!are_alike(state_of(scene, path, space), state_of(scene, vertices, space))) ++other_state;
+  }
+
+  /// Whether both exist, with the same lobes and coordinates.
+  bool are_alike(const std::optional<PathSampler::Sample>& a,
+                 const std::optional<PathSampler::Sample>& b) const {
+    if (!a || !b) return a.has_value() == b.has_value();
+    if (a->topology.end != b->topology.end || a->topology.block_count != b->topology.block_count ||
+        !(LobeSequence(a->topology) == LobeSequence(b->topology)))
+      return false;
+    for (int i = 0; i < a->topology.block_count; ++i)
+      if ((a->coordinates(i) - b->coordinates(i)).norm() > 1e-6 * scene.radius()) return false;
+    return true;
   }
 };
 
@@ -83,9 +100,28 @@ TEST(FoundPath, ItsValueIsContributionOverDensity) {
     EXPECT_LT(sink.different, 1e-3 * sink.charted);
     EXPECT_LT(sink.uncharted, 0.3 * sink.charted);
     EXPECT_LE(sink.different_by_vertices, 1e-3 * sink.by_vertices);
+    EXPECT_LE(sink.other_state, 2e-3 * sink.by_vertices);
     if (is_pinhole(test.scene.camera())) {
       EXPECT_GT(sink.by_vertices, 0.999 * (sink.charted + sink.uncharted));
     }
+  }
+}
+
+/// All light is deposited in the mean, and no start has longer chains than another.
+TEST(ChainSchedule, IsOfTheSameLengthWhateverTheLight) {
+  for (const double light : {0.3, 70.0, 2e3, 5e4, 1e7}) {
+    SCOPED_TRACE(light);
+    double sum = 0;
+    constexpr int kDraws = 20000;
+    for (int i = 0; i < kDraws; ++i) {
+      Rng rng(3, Stream::Test, i);
+      const ChainSchedule chains = schedule_chains(light, 0.2, 100, rng);
+      EXPECT_EQ(chains.mutations, 100.0);
+      EXPECT_GE(chains.deposit, 0.2);
+      EXPECT_LE(chains.chains, 256.0);
+      sum += chains.chains * chains.mutations * chains.deposit;
+    }
+    EXPECT_NEAR(sum / kDraws, light, 4.0 * std::sqrt(light * 20.0 / kDraws));
   }
 }
 

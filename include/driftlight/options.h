@@ -86,8 +86,9 @@ struct RedistributionOptions {
   int chain_length = 100;
   /// Most mutations for each bidirectional sample, in the mean. None: from a pilot.
   std::optional<double> mutations_per_sample = std::nullopt;
-  /// Share of the starts whose chains move by the perturbations of Veach and Guibas 1997 and not
-  /// by Langevin steps; 0 unless the sensor is a pinhole. None: from a pilot.
+  /// Share of the mutations of chains that are perturbations (Veach and Guibas 1997; Jakob and
+  /// Marschner 2012) and not Langevin steps, in turns; 0 unless the sensor is a pinhole. None: a
+  /// fourth, or all where a pilot finds that better.
   std::optional<double> perturbations = std::nullopt;
   /// Light subpaths start where a pilot has found that light comes from.
   bool guide = true;
@@ -114,9 +115,9 @@ struct SplittingOptions {
   double trust = 0.05;
   /// Steps at the last one, whose visits make the image.
   int last_steps = 32;
-  /// Share of the particles that take these as perturbations (Veach and Guibas 1997), manifold
-  /// perturbations (Jakob and Marschner 2012) above all, and not as Langevin steps; more than 0
-  /// with a pinhole only. None: all with a pinhole, else none.
+  /// Share of these that are perturbations (Veach and Guibas 1997), manifold perturbations (Jakob
+  /// and Marschner 2012) above all, and not Langevin steps, in turns; more than 0 with a pinhole
+  /// only. None: all with a pinhole, else none.
   std::optional<double> last_perturbations = std::nullopt;
   /// Samples of each round of the pilot.
   int pilot = 16384;

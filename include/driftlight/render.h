@@ -120,7 +120,7 @@ struct LangevinStatistics {
   double remainder = 0;
   std::uint64_t starts = 0;
   double threshold = 0;             ///< tau
-  double perturbations = 0;         ///< share of the starts
+  double perturbations = 0;         ///< share of the mutations
   double mutations_per_sample = 0;  ///< most, in the mean
   double light_subpaths = 1;        ///< for each sample, in the mean
   double samples_per_pixel = 0;

@@ -118,8 +118,8 @@ void report_redistribution(const std::string& integrator, const LangevinStatisti
                             {"mutations_per_sample", s.mutations_per_sample},
                             {"light_subpaths", s.light_subpaths}});
   report.details.push_back(fmt::format(
-      "threshold {:g}, {:g} light subpaths for each sample, at most {:g} mutations, {:g} of the "
-      "chains perturbed",
+      "threshold {:g}, {:g} light subpaths for each sample, at most {:g} mutations, {:g} of them "
+      "perturbations",
       s.threshold, s.light_subpaths, s.mutations_per_sample, s.perturbations));
   report.summary = {
       fmt::format("{}: {} x {} pixels, {:.4g} samples and {:.4g} mutations per pixel in {:.2f} s",
