@@ -25,7 +25,7 @@ constexpr std::uint64_t kFewer = 4;
 /// Starts of chains that are followed, in the mean, over samples.
 constexpr double kStarts = 1.0 / 16.0;
 /// Share of perturbations in mixed chains.
-constexpr double kMixed = 0.25;
+constexpr double kMixed = 0.5;
 
 /// A pilot errs, by tails above all that it does not see: another plan than the one that serves
 /// almost everywhere, mixed chains for what is brighter than most, must promise so much more. On

@@ -87,8 +87,8 @@ struct RedistributionOptions {
   /// Most mutations for each bidirectional sample, in the mean. None: from a pilot.
   std::optional<double> mutations_per_sample = std::nullopt;
   /// Share of the mutations of chains that are perturbations (Veach and Guibas 1997; Jakob and
-  /// Marschner 2012) and not Langevin steps, in turns; 0 unless the sensor is a pinhole. None: a
-  /// fourth, or all where a pilot finds that better.
+  /// Marschner 2012) and not Langevin steps, in turns; 0 unless the sensor is a pinhole. None:
+  /// half, or all where a pilot finds that better.
   std::optional<double> perturbations = std::nullopt;
   /// Light subpaths start where a pilot has found that light comes from.
   bool guide = true;
