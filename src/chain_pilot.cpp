@@ -26,14 +26,15 @@ constexpr std::uint64_t kFewer = 4;
 constexpr double kStarts = 1.0 / 16.0;
 /// Share of perturbations in mixed chains.
 constexpr double kMixed = 0.5;
+constexpr double kDoubtOfPerturbed = 4.0;
 
 /// A pilot errs, by tails above all that it does not see: another plan than the one that serves
 /// almost everywhere, mixed chains for what is brighter than most, must promise so much more. On
 /// `torus` pilots promised 1.5 times of high thresholds, which have 1.5 times the error, and up to
 /// 3.7 times of perturbed chains, which have four times the error; where all light comes through an
 /// opening 7 to 13 times of perturbed chains.
-double doubt(const ChainPlan& plan) {
-  if (plan.perturbations == 1.0) return 5.0;
+double doubt(const ChainPlan& plan, std::size_t kind) {
+  if (kind > 0) return kDoubtOfPerturbed;
   return plan.threshold == 1.0 && plan.mutations_per_sample == 4.0 ? 1.0 : 2.0;
 }
 
@@ -102,14 +103,14 @@ struct Choices {
     if (options.mutations_per_sample) mutations_per_sample = {*options.mutations_per_sample};
   }
 
-  /// Perturbations are for light of which no sample brings much: of what is bright a pilot sees too
-  /// little to tell whether perturbed chains find their way.
+  /// Perturbations alone are for light of which no sample brings much: of what is bright a pilot
+  /// sees too little to tell whether perturbed chains find their way.
   std::vector<ChainPlan> plans() const {
     std::vector<ChainPlan> plans;
     for (const double threshold : thresholds)
       for (const double share : perturbations)
         for (const double mutations : mutations_per_sample)
-          if (threshold < 1.0 || share == perturbations.front())
+          if (share == (threshold < 1.0 ? perturbations.back() : perturbations.front()))
             plans.push_back({threshold, share, mutations});
     return plans;
   }
@@ -306,7 +307,7 @@ ChainPlan plan_chains(const Scene& scene, const LangevinOptions& options, const 
   tbb::parallel_for(std::size_t{0}, plans.size(), [&](std::size_t i) {
     costs[i] = cost_of(samples, plans[i], choices.kind(plans[i]), pilot.sample_cost,
                        options.redistribution.chain_length) *
-               doubt(plans[i]);
+               doubt(plans[i], choices.kind(plans[i]));
   });
   return plans[static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) -
                                         costs.begin())];

@@ -15,9 +15,8 @@ namespace {
 
 /// Most copies of a particle; beyond them its weight grows.
 constexpr double kMostCopies = 64;
-/// Steps at each softer level; and where narrow lobes are softened: with 4 the particles that start
-/// in the middle of all of them would carry most of the light (glass_block: by 10 effective
-/// families of thousands, with 16 by 90).
+/// Steps at each softer level; and where narrow lobes are softened: else the particles that start
+/// in the middle of all of them would carry most of the light.
 constexpr int kSteps = 4;
 constexpr int kStepsInLobes = 16;
 

@@ -218,7 +218,7 @@ SplittingPlan plan_splitting(TemperedScenes& scenes, const Splitter& prototype,
   double saved = saving(first, plan);
   if (!options.splitting.all && saved < kLeastSaving * count) return {};
   const PilotRun second = run(pilot, plan, samples, samples);
-  if (!options.splitting.levels) leave_out_levels(second.levels, scenes);
+  if (!options.splitting.levels && !scenes.soften_lobes()) leave_out_levels(second.levels, scenes);
   const BrightnessMap before = brightness;
   brightness.add(without_outliers(second.families), count);
   plan.deposit = kLightDeposit;

@@ -22,7 +22,8 @@ namespace driftlight {
 /// bright, while samples do find such paths.
 ///
 /// Levels that little depends on are left out: with d = log E[r^2] / E[r]^2 of the ratio r between
-/// two levels, about the sum of those in between, d is at most that of halving a blur.
+/// two levels, about the sum of those in between, d is at most that of halving a blur. But none of
+/// those that soften lobes, as d does not show what becomes of paths through several.
 ///
 /// Splitting's samples are as many for each sample of the scene as make the error least in a given
 /// time: with variances V, v and costs C, c of the samples of the scene and of the top level, their

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "driftlight/phase_space.h"
@@ -30,10 +31,17 @@ double width_at(int k, int top, double sharpest, double softest) {
   return softest * std::pow(std::min(sharpest, softest) / softest, share);
 }
 
-/// Levels that halve a width; 0 where there is no need.
-int levels_between(double sharpest, double softest) {
-  const double halvings = std::log2(softest / sharpest);
-  return halvings < 1.0 ? 0 : 1 + static_cast<int>(std::lround(halvings));
+/// Widths of emitters at successive levels, one over the other.
+constexpr double kHalving = 2.0;
+/// The same of lobes. A path through n of them is up to 4^n times as bright with half the
+/// roughness, so that all steps at the levels below could not lead the particles apart that are in
+/// the middle of each; thus 2^n times.
+constexpr double kLobeStep = std::numbers::sqrt2;
+
+/// Levels of widths that differ by so much; 0 where there is no need.
+int levels_between(double sharpest, double softest, double step) {
+  const double steps = std::log(softest / sharpest) / std::log(step);
+  return steps < 1.0 ? 0 : 1 + static_cast<int>(std::lround(steps));
 }
 
 /// A sun of solid angle Omega, blurred to a peak of S Omega / (2 pi sigma^2) = S / 4.
@@ -132,13 +140,14 @@ struct Sharp {
 
   /// Width of the first level's sun; and least roughness of its narrow lobes.
   double first_blur() const { return sharpest_blur(*sun); }
-  double first_roughness() const { return 2.0 * roughness; }
+  double first_roughness() const { return kLobeStep * roughness; }
 
   /// As many as the sharpest part needs.
   int levels() const {
-    int count = sun != nullptr ? levels_between(first_blur(), kSoftestSun) : 0;
-    for (const Lamp& lamp : lamps) count = std::max(count, levels_between(lamp.size, kSoftestLamp));
-    return std::max(count, levels_between(first_roughness(), kSoftestLobe));
+    int count = sun != nullptr ? levels_between(first_blur(), kSoftestSun, kHalving) : 0;
+    for (const Lamp& lamp : lamps)
+      count = std::max(count, levels_between(lamp.size, kSoftestLamp, kHalving));
+    return std::max(count, levels_between(first_roughness(), kSoftestLobe, kLobeStep));
   }
 };
 

@@ -24,8 +24,8 @@ namespace driftlight {
 class TemperedScenes {
  public:
   /// So many softer levels, with all area emitters blurred; none: as many as halve what is sharp
-  /// from one to the next, 0 if nothing is, and area emitters are blurred only if one is small. The
-  /// scene must outlive this.
+  /// from one to the next, twice as many for lobes, 0 if nothing is, and area emitters are blurred
+  /// only if one is small. The scene must outlive this.
   TemperedScenes(const Scene& scene, std::optional<int> levels);
 
   /// The softest level.
