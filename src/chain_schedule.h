@@ -29,14 +29,15 @@ struct ChainSchedule {
   double deposit;
 };
 
-/// Chains of `length` mutations that deposit `deposit` each, or if they would be too many, more. As
-/// many mutations whatever the light: chains of a start x reach y after k mutations by P^k(x, y),
-/// and only what all starts bring there together is in balance, for each k.
+/// Chains of `length` mutations that deposit `deposit` each, or if these would be too many, more.
+/// As many mutations whatever the light: chains of a start x reach y after k mutations by P^k(x,
+/// y), and only what all starts bring there together is in balance, for each k.
 inline ChainSchedule schedule_chains(double light, double deposit, double length, Rng& rng) {
-  constexpr double kMostChains = 256;
+  constexpr double kMostMutations = 25600;
+  const double most = std::max(1.0, std::floor(kMostMutations / length));
   const double chains = std::floor(light / (deposit * length) + rng.uniform());
-  if (!(chains > kMostChains)) return {chains, length, deposit};
-  return {kMostChains, length, light / (kMostChains * length)};
+  if (!(chains > most)) return {chains, length, deposit};
+  return {most, length, light / (most * length)};
 }
 
 }  // namespace driftlight

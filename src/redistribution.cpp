@@ -2,6 +2,7 @@
 #include "redistribution.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -24,6 +25,13 @@
 namespace driftlight {
 namespace {
 
+/// What is left above this height, over that of the rest's floor, has chains of its own, so many
+/// times as long: they need longer to find their way out of such a place, and their light would
+/// show as a spot. Longer chains for the start's sake would not be in balance (chain_schedule.h);
+/// but either part of what is left is a target by itself.
+constexpr double kHeavy = 256;
+constexpr double kHeavyLength = 16;
+
 /// What all samples of a render share.
 struct Redistribution {
   const Scene& scene;
@@ -34,6 +42,7 @@ struct Redistribution {
   Film film;  ///< of the chains, in units of `unit`
   SplittingShare splitting;
   ChainPlan plan;
+  std::array<Remainder, 2> parts;  ///< of the remainder, for chains
   double unit;
   double deposit;  ///< epsilon
   ExactSum remainders;
@@ -50,6 +59,8 @@ struct Redistribution {
         film(scene.camera().film_width, scene.camera().film_height, scene.camera().filter),
         splitting(scene, options, render, remainder, pilot.brightness),
         plan(plan_chains(scene, options, pilot, splitting, render.seed)),
+        parts(Remainder(scene, pilot.guide, pilot.brightness, plan.threshold)
+                  .split_at(kHeavy * std::max(1.0, plan.threshold))),
         unit(pilot.brightness.film_unit()),
         deposit(deposit_for(0.0, plan.mutations_per_sample)) {
     remainder.set_tau(plan.threshold);
@@ -82,8 +93,7 @@ class RedistributionSampler {
   explicit RedistributionSampler(Redistribution& common)
       : common_(common),
         tracer_(common.scene, common.pilot.guide, MisHeuristic::Power, common.options.max_depth),
-        chain_(common.scene, common.options, common.options.kernel, common.plan.perturbations,
-               kManifoldsOfChains, common.remainder, common.layers),
+        chains_{chain(0), chain(1)},
         splitting_(common.splitting) {}
 
   void sample(const Vec2d& film, Rng& rng, SampleFilm::Sink& film_sink) {
@@ -92,7 +102,10 @@ class RedistributionSampler {
     Sink sink{*this, film, rng, film_sink};
     tracer_.sample(film, rng, sink);
     if (left_ > 0.0) common_.remainders.add(left_);
-    if (starts_ > 0) common_.counts.add(chain_.take_statistics(), starts_);
+    if (starts_ > 0) {
+      common_.counts.add(chains_[0].take_statistics(), starts_);
+      common_.counts.add(chains_[1].take_statistics(), 0);
+    }
     splitting_.sample(film, rng);
   }
 
@@ -119,14 +132,26 @@ class RedistributionSampler {
     if (!(left > 0.0)) return 1.0;
     if (!common_.splitting.takes(path)) {
       left_ += left;
-      spread(film, value, left, path, rng);
+      for (const std::size_t part : {0U, 1U})
+        spread(film, value, part, common_.parts.at(part).left(w, path), path, rng);
     }
     return 1.0 - left / (path.factor * w);
   }
 
-  /// By chains of mutations that deposit epsilon each.
-  void spread(const Vec2d& film, const Rgbd& value, double left, const FoundPath& path, Rng& rng) {
-    const double length = common_.options.redistribution.chain_length;
+  MixedChain chain(std::size_t part) const {
+    return {common_.scene,          common_.options,
+            common_.options.kernel, common_.plan.perturbations,
+            kManifoldsOfChains,     common_.parts.at(part),
+            common_.layers};
+  }
+
+  /// Spreads a part of what is left by chains of mutations that deposit epsilon each.
+  void spread(const Vec2d& film, const Rgbd& value, std::size_t part, double left,
+              const FoundPath& path, Rng& rng) {
+    if (!(left > 0.0)) return;
+    MixedChain& chain = chains_.at(part);
+    const double length =
+        (part == 0 ? 1.0 : kHeavyLength) * common_.options.redistribution.chain_length;
     const ChainSchedule schedule = schedule_chains(left, common_.deposit, length, rng);
     if (!(schedule.chains > 0.0)) return;
     ++starts_;
@@ -134,7 +159,7 @@ class RedistributionSampler {
       common_.film.splat(share.film, color,
                          weight * schedule.deposit * share.brightness / common_.unit);
     };
-    if (!chain_.start_at(path)) {
+    if (!chain.start_at(path)) {
       // No state of a chain: as if it never moved.
       Share stays;
       stays.film = film;
@@ -143,19 +168,19 @@ class RedistributionSampler {
       return;
     }
     std::optional<GradientProbe> probe =
-        common_.probed && chain_.start()
-            ? common_.probed->probe(chain_.start()->contribution,
+        common_.probed && part == 0 && chain.start()
+            ? common_.probed->probe(chain.start()->contribution,
                                     schedule.chains * schedule.mutations)
             : std::nullopt;
-    chain_.observe(probe ? &*probe : nullptr);
+    chain.observe(probe ? &*probe : nullptr);
     for (double i = 0; i < schedule.chains; ++i)
-      chain_.run(static_cast<std::uint64_t>(schedule.mutations), rng, deposit);
+      chain.run(static_cast<std::uint64_t>(schedule.mutations), rng, deposit);
     if (probe) common_.probed->take(*probe);
   }
 
   Redistribution& common_;
   BidirectionalTracer tracer_;
-  MixedChain chain_;
+  std::array<MixedChain, 2> chains_;  ///< of the parts
   SplittingShare::Sampler splitting_;
   // Of the sample in hand.
   double left_ = 0;  ///< to chains

@@ -15,7 +15,8 @@ constexpr double kMostW = 1e9;
 
 double Remainder::left(double weight, const FoundPath& path) const {
   const double tau = this->tau(path.s + path.t - 1);
-  return weight > tau && weight < kMostW ? path.factor * (weight - tau) : 0.0;
+  const double ceiling = this->ceiling(path.s + path.t - 1);
+  return weight > tau && weight < kMostW ? path.factor * (std::min(weight, ceiling) - tau) : 0.0;
 }
 
 std::optional<BrightPath> Remainder::bright_path(const FoundPath& path,
@@ -60,8 +61,9 @@ Share Remainder::share(int edges, const Contribution& contribution, double log_q
   share.w = std::exp(contribution.log_target - log_q - std::log(share.brightness));
   share.tau = tau(edges);
   const bool remains = share.w < kMostW && std::isfinite(log_q);
+  const double excess = std::max(0.0, std::min(share.w, ceiling(edges)) - share.tau);
   share.log_remainder =
-      remains ? log_q + std::log(share.excess()) : -std::numeric_limits<double>::infinity();
+      remains ? log_q + std::log(excess) : -std::numeric_limits<double>::infinity();
   return share;
 }
 

@@ -54,16 +54,24 @@ struct BrightPath {
 
 class Remainder {
  public:
-  /// q is of samples by this guide. All references must outlive it.
+  /// q is of samples by this guide. With a ceiling in the place of infinity it is what of
+  /// (w - tau)_+ lies below that, (min(w, ceiling) - tau)_+. All references must outlive it.
   Remainder(const Scene& scene, const EmissionGuide& guide, const BrightnessMap& brightness,
-            double tau)
-      : scene_(scene), guide_(guide), brightness_(brightness), tau_(tau) {}
+            double tau, double ceiling = kInfinity)
+      : scene_(scene), guide_(guide), brightness_(brightness), tau_(tau), ceiling_(ceiling) {}
+
+  /// What lies below and what above the height h, whose sum it is.
+  std::array<Remainder, 2> split_at(double h) const {
+    return {Remainder{scene_, guide_, brightness_, tau_, h},
+            Remainder{scene_, guide_, brightness_, h, ceiling_}};
+  }
 
   /// The least tau.
   double tau() const { return tau_; }
   void set_tau(double tau) { tau_ = tau; }
   /// That of paths of so many edges.
   double tau(int edges) const { return edges > 1 ? tau_ : tau_seen(tau_); }
+  double ceiling(int edges) const { return edges > 1 ? ceiling_ : tau_seen(ceiling_); }
   /// Of paths of one edge, where that of others is tau.
   static double tau_seen(double tau) { return 16.0 * std::max(1.0, tau); }
   /// w of what a sample has found at the film point.
@@ -92,6 +100,7 @@ class Remainder {
   const EmissionGuide& guide_;
   const BrightnessMap& brightness_;
   double tau_;
+  double ceiling_;
 };
 
 /// A chain that leaves the remainder invariant, by Langevin steps.
