@@ -26,15 +26,14 @@ constexpr std::uint64_t kFewer = 4;
 constexpr double kStarts = 1.0 / 16.0;
 /// Share of perturbations in mixed chains.
 constexpr double kMixed = 0.5;
-constexpr double kDoubtOfPerturbed = 4.0;
 
 /// A pilot errs, by tails above all that it does not see: another plan than the one that serves
 /// almost everywhere, mixed chains for what is brighter than most, must promise so much more. On
-/// `torus` pilots promised 1.5 times of high thresholds, which have 1.5 times the error, and up to
-/// 3.7 times of perturbed chains, which have four times the error; where all light comes through an
-/// opening 7 to 13 times of perturbed chains.
+/// `torus` pilots promised 1.5 times of high thresholds, which have 1.5 times the error. Over
+/// chains of Langevin steps they promised up to 3.7 times of perturbed ones there, which have four
+/// times the error; where all light comes through an opening 7 to 13 times.
 double doubt(const ChainPlan& plan, std::size_t kind) {
-  if (kind > 0) return kDoubtOfPerturbed;
+  if (kind > 0) return 4.0;
   return plan.threshold == 1.0 && plan.mutations_per_sample == 4.0 ? 1.0 : 2.0;
 }
 

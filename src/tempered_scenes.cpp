@@ -31,11 +31,10 @@ double width_at(int k, int top, double sharpest, double softest) {
   return softest * std::pow(std::min(sharpest, softest) / softest, share);
 }
 
-/// Widths of emitters at successive levels, one over the other.
+/// Width of an emitter at a level, over that at the next sharper one.
 constexpr double kHalving = 2.0;
-/// The same of lobes. A path through n of them is up to 4^n times as bright with half the
-/// roughness, so that all steps at the levels below could not lead the particles apart that are in
-/// the middle of each; thus 2^n times.
+/// The same of a lobe. In the middle of n lobes a path is 4^n times as bright if they are halved,
+/// and its particles multiply faster than they find their way out; so it is 2^n times.
 constexpr double kLobeStep = std::numbers::sqrt2;
 
 /// Levels of widths that differ by so much; 0 where there is no need.
