@@ -55,7 +55,9 @@ RoughTransmittance::RoughTransmittance(const Microfacets& microfacets, double et
 
 /// Beyond the ends the coefficients go on straight.
 RoughTransmittance::Cubic RoughTransmittance::cubic(double cosine) const {
-  const int cell = std::clamp(static_cast<int>(cosine * kCells), 0, kCells - 1);
+  // A cosine that is not a number has no cell: what follows from it is none either.
+  const double place = cosine * kCells;
+  const int cell = place > 0.0 ? static_cast<int>(std::min(place, kCells - 1.0)) : 0;
   const auto i = static_cast<std::size_t>(cell);
   const double c1 = table_[i];
   const double c2 = table_[i + 1];

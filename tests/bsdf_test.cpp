@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -475,7 +476,7 @@ TEST(Bsdf, ThinPaneSumsItsReflections) {
 }
 
 // Law: the table of a rough coat is what sampling finds, its slope that of finite differences, and
-// as the roughness vanishes it is that of a smooth one.
+// as the roughness vanishes it is that of a smooth one. Of no number it makes none.
 TEST(RoughTransmittance, IsWhatIsNotReflected) {
   Rng rng(71, Stream::Test, 0);
   for (const auto distribution : {Distribution::Beckmann, Distribution::Ggx}) {
@@ -505,6 +506,7 @@ TEST(RoughTransmittance, IsWhatIsNotReflected) {
     for (const double cosine : {0.1, 0.33, 0.9})
       EXPECT_NEAR(smooth.eval(cosine), 1.0 - fresnel_dielectric(cosine, 1.5), 2e-4);
     EXPECT_NEAR(smooth.diffuse(), 1.0 - 0.0918, 1e-3);  // 2 int F cos d cos at 1.5: 9.18 %
+    EXPECT_TRUE(std::isnan(smooth.eval(std::numeric_limits<double>::quiet_NaN())));
   }
 }
 

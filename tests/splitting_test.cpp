@@ -279,7 +279,7 @@ TEST(SoftenedBsdf, IsAsRoughAsAskedFor) {
   EXPECT_EQ(rough.microfacets.alpha_u, 0.05);
   EXPECT_EQ(rough.microfacets.alpha_v, 0.2);
   // A blend does not change what it shares.
-  const auto box = [](const Bsdf& bsdf) { return std::make_shared<const BsdfBox>(bsdf); };
+  const auto box = [](const Bsdf& bsdf) { return std::make_shared<const BsdfBox>(BsdfBox{bsdf}); };
   const Blend blend{.first = box(metal), .second = box(Diffuse{})};
   const Bsdf all[] = {metal,
                       Phong{.exponent = 2000},
