@@ -55,7 +55,7 @@ RoughTransmittance::RoughTransmittance(const Microfacets& microfacets, double et
 
 /// Beyond the ends the coefficients go on straight.
 RoughTransmittance::Cubic RoughTransmittance::cubic(double cosine) const {
-  // A cosine that is not a number has no cell: what follows from it is none either.
+  // NaN cannot be converted to an integer; in any cell it stays NaN.
   const double place = cosine * kCells;
   const int cell = place > 0.0 ? static_cast<int>(std::min(place, kCells - 1.0)) : 0;
   const auto i = static_cast<std::size_t>(cell);
